@@ -1,0 +1,1 @@
+"""ringlet: config -> groom -> simulate -> interpolate -> render."""

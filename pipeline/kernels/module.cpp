@@ -1,0 +1,35 @@
+// The extension module: which instruction sets the processor has, how many threads to use, and the rooms.
+#include "bindings.hpp"
+
+#include <omp.h>
+
+#include <string>
+
+namespace ringlet {
+
+static int thread_count = 0; // 0: all processors
+
+int threads() { return thread_count > 0 ? thread_count : omp_get_num_procs(); }
+
+static int cpu_level() {
+#if defined(__x86_64__)
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("x86-64-v4")) return 4;
+    if (__builtin_cpu_supports("x86-64-v3")) return 3;
+#endif
+    return 0;
+}
+
+static void set_threads(int count) {
+    require(count >= 0, "threads: expected 0 (all processors) or a positive number");
+    thread_count = count;
+}
+
+} // namespace ringlet
+
+NB_MODULE(RINGLET_MODULE, m) {
+    m.def("cpu_level", &ringlet::cpu_level, "x86-64 level of this processor: 4, 3 or 0 (neither).");
+    m.def("set_threads", &ringlet::set_threads, nanobind::arg("count"),
+          "Threads of every kernel from now on; 0 is all processors. No result depends on it.");
+    m.def("threads", &ringlet::threads, "Threads that kernels use.");
+}

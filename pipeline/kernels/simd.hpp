@@ -1,0 +1,67 @@
+// Blocks of strands side by side: one SIMD lane holds one strand.
+//
+// A `Lanes<Real>` is 64 bytes wide on every instruction set (8 x float64 or 16 x float32; narrower
+// machines split it), so that a block holds the same strands everywhere. `Vec3<Real>` is a point of
+// each strand of the block.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace ringlet {
+
+template <class Real> struct LaneTypes;
+template <> struct LaneTypes<double> {
+    typedef double Lanes __attribute__((vector_size(64)));
+    typedef int64_t Mask __attribute__((vector_size(64)));
+};
+template <> struct LaneTypes<float> {
+    typedef float Lanes __attribute__((vector_size(64)));
+    typedef int32_t Mask __attribute__((vector_size(64)));
+};
+
+template <class Real> using Lanes = typename LaneTypes<Real>::Lanes;
+template <class Real> using Mask = typename LaneTypes<Real>::Mask;
+
+/// Strands in a block.
+template <class Real> inline constexpr int kLanes = 64 / int(sizeof(Real));
+
+#define RINGLET_INLINE inline __attribute__((always_inline))
+
+template <class Real> RINGLET_INLINE Lanes<Real> splat(Real value) { return Lanes<Real>{} + value; }
+
+template <class Real> RINGLET_INLINE Lanes<Real> square_root(Lanes<Real> a) {
+    Lanes<Real> r;
+    for (int i = 0; i < kLanes<Real>; ++i) r[i] = std::sqrt(a[i]);
+    return r;
+}
+
+template <class Real> RINGLET_INLINE Lanes<Real> select(Mask<Real> mask, Lanes<Real> yes, Lanes<Real> no) {
+    return mask ? yes : no;
+}
+
+template <class Real> RINGLET_INLINE Real largest(Lanes<Real> a) {
+    Real m = a[0];
+    for (int i = 1; i < kLanes<Real>; ++i) m = a[i] > m ? a[i] : m;
+    return m;
+}
+
+template <class Real> RINGLET_INLINE Real smallest(Lanes<Real> a) {
+    Real m = a[0];
+    for (int i = 1; i < kLanes<Real>; ++i) m = a[i] < m ? a[i] : m;
+    return m;
+}
+
+template <class Real> struct Vec3 {
+    Lanes<Real> x, y, z;
+
+    friend RINGLET_INLINE Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+    friend RINGLET_INLINE Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+    friend RINGLET_INLINE Vec3 operator*(Lanes<Real> s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
+    friend RINGLET_INLINE Lanes<Real> dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+    friend RINGLET_INLINE Vec3 cross(Vec3 a, Vec3 b) {
+        return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    }
+};
+
+} // namespace ringlet
