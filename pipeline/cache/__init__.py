@@ -1,0 +1,28 @@
+"""What every stage leaves behind: one HDF5 file that is whole, verified and keyed by what it was made from."""
+
+from pipeline.cache.atomic import replacing
+from pipeline.cache.columns import Damaged
+from pipeline.cache.experiment import Experiment
+from pipeline.cache.guides import GuidesReader, GuidesWriter, create_guides, open_guides
+from pipeline.cache.pictures import picture_record, write_picture
+from pipeline.cache.segments import Frame, Segments
+from pipeline.cache.store import Missing, Reader, Writer, create, open
+
+__all__ = [
+    "Damaged",
+    "Experiment",
+    "Frame",
+    "GuidesReader",
+    "GuidesWriter",
+    "Missing",
+    "Reader",
+    "Segments",
+    "Writer",
+    "create",
+    "create_guides",
+    "open",
+    "open_guides",
+    "picture_record",
+    "replacing",
+    "write_picture",
+]

@@ -4,9 +4,10 @@
 Values are SI; see `units` for the strings that are accepted. Models are frozen and refuse unknown keys.
 """
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from pipeline.config.units import (
     Acceleration,
@@ -23,15 +24,13 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Vector = tuple[float, float, float]
 Position = tuple[Length, Length, Length]
 Velocity = tuple[Speed, Speed, Speed]
-Colour = tuple[
-    Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]
-]
+Colour = tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]]
 
 
 class Section(BaseModel):
     """A frozen table of options that refuses unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
 
 # --- scene --------------------------------------------------------------------------------------
@@ -250,6 +249,16 @@ class Keyframe(Section):
     """Rotation vector: axis times angle."""
 
 
+def _ascending(frames: tuple[Keyframe, ...]) -> tuple[Keyframe, ...]:
+    for i, (before, after) in enumerate(pairwise(frames)):
+        if after.time <= before.time:
+            raise ValueError(f"keyframe {i + 2} is not later than keyframe {i + 1}; sort them by time")
+    return frames
+
+
+Keyframes = Annotated[tuple[Keyframe, ...], AfterValidator(_ascending)]
+
+
 class Motion(Section):
     preset: Literal["none", "nod", "shake", "turn"] = "none"
     """A motion of the head about its pivot; keyframes replace it."""
@@ -261,7 +270,7 @@ class Motion(Section):
     """Number of swings of a preset; after them the head holds still."""
     pivot: Position = (0.0, -0.05, -0.015)
     """The point that the head turns about [m]."""
-    keyframes: tuple[Keyframe, ...] = ()
+    keyframes: Keyframes = ()
     """Poses at times; between them a smooth spline, held before the first and after the last."""
 
 
@@ -294,7 +303,7 @@ class Simulate(Section):
     """Hair on head."""
     motion: Motion = Motion()
     """Motion of the head."""
-    tips: tuple[Keyframe, ...] = ()
+    tips: Keyframes = ()
     """Motion of pinned tips relative to the head, as keyframes."""
 
 
@@ -346,9 +355,7 @@ class Fibre(Section):
 
 
 class Render(Section):
-    size: tuple[
-        Annotated[int, Field(ge=16, le=16384)], Annotated[int, Field(ge=16, le=16384)]
-    ] = (1280, 720)
+    size: tuple[Annotated[int, Field(ge=16, le=16384)], Annotated[int, Field(ge=16, le=16384)]] = (1280, 720)
     """Width and height of a frame [px]."""
     samples: Annotated[int, Field(ge=1, le=8)] = 2
     """N for N x N supersampling."""

@@ -25,6 +25,9 @@ static void set_threads(int count) {
     thread_count = count;
 }
 
+void bind_energy(nb::module_ &m);
+void bind_step(nb::module_ &m);
+
 } // namespace ringlet
 
 NB_MODULE(RINGLET_MODULE, m) {
@@ -32,4 +35,6 @@ NB_MODULE(RINGLET_MODULE, m) {
     m.def("set_threads", &ringlet::set_threads, nanobind::arg("count"),
           "Threads of every kernel from now on; 0 is all processors. No result depends on it.");
     m.def("threads", &ringlet::threads, "Threads that kernels use.");
+    ringlet::bind_energy(m);
+    ringlet::bind_step(m);
 }

@@ -52,11 +52,27 @@ template <class Real> RINGLET_INLINE Real smallest(Lanes<Real> a) {
     return m;
 }
 
+template <class Real> RINGLET_INLINE Lanes<Real> maximum(Lanes<Real> a, Lanes<Real> b) { return a > b ? a : b; }
+
+template <class Real> RINGLET_INLINE Lanes<Real> minimum(Lanes<Real> a, Lanes<Real> b) { return a < b ? a : b; }
+
+/// Whether any lane of the mask is set.
+template <class Real> RINGLET_INLINE bool any(Mask<Real> mask) {
+    int64_t words[8], bits = 0;
+    __builtin_memcpy(words, &mask, sizeof words);
+    for (int64_t word : words) bits |= word;
+    return bits != 0;
+}
+
 template <class Real> struct Vec3 {
     Lanes<Real> x, y, z;
 
     friend RINGLET_INLINE Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
     friend RINGLET_INLINE Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+    friend RINGLET_INLINE Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
+    friend RINGLET_INLINE Vec3 select(Mask<Real> mask, Vec3 yes, Vec3 no) {
+        return {mask ? yes.x : no.x, mask ? yes.y : no.y, mask ? yes.z : no.z};
+    }
     friend RINGLET_INLINE Vec3 operator*(Lanes<Real> s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
     friend RINGLET_INLINE Lanes<Real> dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
     friend RINGLET_INLINE Vec3 cross(Vec3 a, Vec3 b) {

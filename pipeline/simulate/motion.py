@@ -69,7 +69,7 @@ def preset_angle(motion: Motion) -> Signal:
         return amplitude * float(np.sin(2 * np.pi * eased_phase(time, swings * period, period / 2) / period))
 
     def turn(time: float) -> float:
-        return amplitude * sum((-1) ** i * ease(time / period - i) for i in range(swings))
+        return amplitude * sum((-1.0) ** i * ease(time / period - i) for i in range(swings))
 
     return turn if motion.preset == "turn" else swing
 
@@ -93,36 +93,34 @@ def keyframe_spline(keyframes: Sequence[Keyframe]) -> Callable[[float], Vector]:
 def head_motion(motion: Motion) -> Callable[[float], Pose]:
     """The head's pose (4, 4) at a time [s]; the first pose before time 0."""
     pivot = np.array(motion.pivot)
-    if motion.keyframes:
-        spline = keyframe_spline(motion.keyframes)
-
-        def pose(time: float) -> Pose:
-            value = spline(max(time, 0.0))
-            return rigid(value[3:], value[:3], pivot)
-    elif motion.preset == "none":
-
-        def pose(time: float) -> Pose:
-            return np.eye(4)
-    else:
+    if motion.preset == "none" and not motion.keyframes:
+        return lambda _: np.eye(4)
+    if not motion.keyframes:
         axis, angle = np.array(_AXES[motion.preset]), preset_angle(motion)
+        return lambda time: rigid(axis * angle(time), np.zeros(3), pivot)
+    spline = keyframe_spline(motion.keyframes)
 
-        def pose(time: float) -> Pose:
-            return rigid(axis * angle(time), np.zeros(3), pivot)
+    def pose(time: float) -> Pose:
+        value = spline(max(time, 0.0))
+        return rigid(value[3:], value[:3], pivot)
 
     return pose
 
 
-def tip_motion(keyframes: Sequence[Keyframe]) -> Callable[[float], tuple[Vector, Vector]]:
-    """Rotation (3, 3) and translation (3,) [m] of pinned tips at a time [s], in the head's frame.
+def tip_motion(keyframes: Sequence[Keyframe], centre: Vector, lead: float) -> Callable[[float], Pose]:
+    """The pose (4, 4) of the hand that holds pinned tips at a time [s], in the head's frame.
 
-    Every tip turns about its own last point, so that several strands are wrung alike.
+    The tips move as one body that turns about `centre` (3,) [m]. Before time 0 they are brought from where they
+    are at rest to their first pose, which they reach `lead` [s] early.
     """
     if not keyframes:
-        return lambda time: (np.eye(3), np.zeros(3))
+        return lambda _: np.eye(4)
     spline = keyframe_spline(keyframes)
 
-    def motion(time: float) -> tuple[Vector, Vector]:
+    def pose(time: float) -> Pose:
         value = spline(max(time, 0.0))
-        return rotation_matrix(value[3:]), value[:3]
+        if time < 0 < lead:
+            value = value * ease(2 + time / lead)
+        return rigid(value[3:], value[:3], centre)
 
-    return motion
+    return pose

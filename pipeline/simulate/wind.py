@@ -25,7 +25,7 @@ def wind(air: Air, seed: int) -> Callable[[float], NDArray[np.float64]]:
     """
     mean = np.array(air.wind)
     if air.gusts == 0:
-        return lambda time: mean
+        return lambda _: mean
     wave = np.arange(3 * _WAVES, dtype=np.uint32)
     band = np.arange(_WAVES)[None] + random.uniform(seed, wave, _SALT).reshape(3, _WAVES)
     frequency = 2 ** (_OCTAVES * band / _WAVES) / air.gust_period

@@ -65,8 +65,10 @@ def test_folders_report_missing_pictures_and_the_page_shows_them(tmp_path: Path)
     assert not found.identical
     assert [pair.metrics is None for pair in found.pairs] == [True, False, True]
     text = page.read_text()
-    assert "missing: the new picture" in text and "missing: the reference" in text
-    assert "3&lt;b&gt;.png" in text and "3<b>" not in text
+    assert "missing: the new picture" in text
+    assert "missing: the reference" in text
+    assert "3&lt;b&gt;.png" in text
+    assert "3<b>" not in text
 
 
 def test_bad_paths_and_pictures_give_one_clear_message(tmp_path: Path) -> None:

@@ -1,0 +1,120 @@
+# ringlet: `make render` gives frames of moving hair, `make test` checks everything. `make help` lists the rest.
+
+ifeq ($(filter grouped-target,$(.FEATURES)),)
+$(error GNU make 4.3 or newer is needed; this is $(MAKE_VERSION))
+endif
+MAKEFLAGS += --no-builtin-rules --no-builtin-variables
+.SUFFIXES:
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+CONFIG ?= configs/default.toml
+PYTHON ?= python3
+VENV    = .venv
+BIN     = $(VENV)/bin
+RINGLET = $(BIN)/ringlet
+
+# --- Environment: libraries by locked versions, then the kernels ---------------------------------
+
+ENV     = $(VENV)/.complete
+KERNELS = build/kernels/.built
+KERNEL_SOURCES = $(wildcard pipeline/kernels/*.cpp pipeline/kernels/*.hpp) pipeline/kernels/CMakeLists.txt
+
+.PHONY: env
+env: $(ENV) $(KERNELS) ## prepare everything that the other targets need
+
+$(ENV): requirements.lock pyproject.toml .ci/environment
+	@PYTHON=$(PYTHON) .ci/environment $(VENV)
+	@touch $@
+
+$(KERNELS): $(KERNEL_SOURCES) | $(ENV)
+	@echo "building the kernels"
+	@$(BIN)/cmake -S pipeline/kernels -B build/kernels -G Ninja -DCMAKE_BUILD_TYPE=Release \
+	  -DPython_EXECUTABLE=$(abspath $(BIN)/python) -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) >build.log 2>&1 \
+	  || { cat build.log; rm -f build.log; exit 1; }
+	@rm -f build.log
+	@$(BIN)/cmake --build build/kernels
+	@$(BIN)/cmake --install build/kernels --prefix . >/dev/null
+	@touch $@
+
+# --- Experiments: every configs/x.toml is a target, `make x` or `make outputs/x` ------------------
+
+# Words "name|file"; a config's name is its file's stem unless it sets one.
+CONFIGS := $(sort $(wildcard configs/*.toml configs/*/*.toml) $(CONFIG))
+NAMED   := $(shell grep -sHm1 -E "^name *= *[\"']" $(CONFIGS) \
+             | sed -E "s/^([^:]+):name *= *[\"']([^\"']+).*/\2|\1/")
+UNNAMED := $(filter-out $(foreach n,$(NAMED),$(lastword $(subst |, ,$n))),$(CONFIGS))
+ALL     := $(NAMED) $(foreach f,$(UNNAMED),$(basename $(notdir $f))|$f)
+NAMES   := $(foreach n,$(ALL),$(firstword $(subst |, ,$n)))
+NAME    := $(firstword $(subst |, ,$(filter %|$(CONFIG),$(ALL))))
+
+# The experiments that this call of make is about; only their rules are read.
+GOALS   := $(foreach g,$(MAKECMDGOALS),$(firstword $(subst /, ,$(g:outputs/%=%))))
+WANTED  := $(sort $(filter $(NAMES),$(GOALS)) $(if $(filter render movie sheet,$(GOALS)),$(NAME)))
+
+ifneq ($(WANTED),)
+# Which frames there are and which key each stage has, `ringlet keys` writes down: see pipeline/cli/stamps.py.
+SOURCES := $(wildcard pipeline/*.py pipeline/*/*.py) $(KERNEL_SOURCES)
+
+define rules
+outputs/$1/targets.mk: $(lastword $(subst |, ,$(filter $1|%,$(ALL)))) $(SOURCES) $(KERNELS) | $(ENV)
+	@$$(RINGLET) keys $$<
+endef
+$(foreach n,$(WANTED),$(eval $(call rules,$n)))
+
+include $(WANTED:%=outputs/%/targets.mk)
+
+.PHONY: $(WANTED) $(WANTED:%=outputs/%)
+$(filter-out render movie sheet,$(WANTED)): %: outputs/%
+endif
+
+.PHONY: render movie sheet
+render: $(if $(NAME),outputs/$(NAME)) ## frames of CONFIG (configs/default.toml): make render CONFIG=configs/curly.toml
+
+movie: render ## the frames of CONFIG as one movie
+	@$(RINGLET) movie $(CONFIG)
+
+sheet: render ## the frames of CONFIG on one page
+	@$(RINGLET) sheet $(CONFIG)
+
+# --- Checks --------------------------------------------------------------------------------------
+
+.PHONY: test lint validate images approve bench sanitize
+test: env ## all tests
+	$(BIN)/pytest
+
+lint: env ## style, types, and who may import whom
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+validate: env ## the physics against closed forms and measurements
+	$(RINGLET) validate
+
+images: env ## golden images; differences go to an HTML page
+	$(BIN)/pytest tests/images
+
+approve: env ## take the present images as the golden ones
+	$(BIN)/python tests/images/approve.py
+
+bench: env ## the figures of the README
+	$(RINGLET) bench simulate
+	$(RINGLET) bench interpolate
+	$(RINGLET) bench render
+
+sanitize: env ## kernels under the address and undefined-behaviour sanitizers
+	tests/kernels/sanitize.sh
+
+# --- The rest ------------------------------------------------------------------------------------
+
+.PHONY: clean distclean help
+clean: ## remove all outputs
+	find outputs -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +
+
+distclean: clean ## remove the environment and what was built, too
+	rm -rf $(VENV) build pipeline/kernels/*.so
+
+help: ## this list
+	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1|\2/p' Makefile | column -t -s '|'
+	@echo; echo "Experiments, each a target:"; printf '  make %s\n' $(sort $(NAMES))

@@ -1,0 +1,61 @@
+"""What all commands share: the application, the options that recur, and JSON on standard output."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Group, Parameter
+
+if TYPE_CHECKING:
+    from pipeline.cache import Experiment
+    from pipeline.config import Loaded
+
+STAGES_GROUP = Group("Run", sort_key=0)
+LOOK_GROUP = Group("Look", sort_key=1)
+CHECK_GROUP = Group("Check and measure", sort_key=2)
+
+app = App(
+    name="ringlet",
+    help="Batch hair pipeline: config -> groom -> simulate -> interpolate -> render.",
+    help_format="plaintext",
+    suppress_keyboard_interrupt=False,
+)
+
+Settings = Annotated[
+    tuple[str, ...],
+    Parameter(
+        name=["-s", "--set"],
+        negative="",
+        show_default=False,
+        allow_leading_hyphen=True,
+        help='Override a value, as in -s "groom.cut.length=20 cm"; may be repeated.',
+    ),
+]
+Outputs = Annotated[Path, Parameter(help="Folder that holds a folder for each experiment.")]
+Json = Annotated[
+    bool, Parameter(name="--json", negative="", show_default=False, help="Print one JSON object.")
+]
+ConfigFile = Annotated[Path, Parameter(help="A config, such as configs/default.toml.")]
+
+OUTPUTS = Path("outputs")
+
+
+def load_config(config: Path, settings: tuple[str, ...]) -> "Loaded":
+    """Load a config with its overrides; raises InputError."""
+    from pipeline.config import load
+
+    return load(config, settings)
+
+
+def experiment_of(loaded: "Loaded", outputs: Path) -> "Experiment":
+    """Return the experiment's folder, named after the config."""
+    from pipeline.cache import Experiment
+
+    return Experiment(outputs / loaded.config.name)
+
+
+def print_json(value: dict[str, Any]) -> None:
+    """Print one object on standard output."""
+    json.dump(value, sys.stdout, indent=2, ensure_ascii=False)
+    sys.stdout.write("\n")

@@ -1,0 +1,151 @@
+"""Commands that check and measure: validate, bench, compare, doctor."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import App, Parameter
+
+from pipeline.cli.base import CHECK_GROUP, Json, app, print_json
+from pipeline.errors import InputError
+
+Flag = Parameter(negative="", show_default=False)
+Count = Annotated[int, Parameter(help="How many.")]
+
+_CASE = ("name", "model", "measured", "reference", "tolerance", "passed")
+
+bench = App(
+    name="bench",
+    help="Measure the real work of one stage: warm, median of several repeats.",
+    group=CHECK_GROUP,
+)
+app.command(bench)
+
+
+@app.command(group=CHECK_GROUP)
+def validate(
+    case: Annotated[str | None, Parameter(help="Only cases with this in their name.")] = None,
+    *,
+    quick: Annotated[bool, Flag, Parameter(help="Short versions of the cases.")] = False,
+    json: Json = False,
+) -> int:
+    """Compare the physics with closed forms and measurements; exit code 1 outside the tolerance."""
+    from pipeline.validation import run_cases
+
+    results = [found for found in run_cases(quick) if case is None or case in found.name]
+    cases = [{name: getattr(found, name) for name in _CASE} for found in results]
+    if not cases:
+        raise InputError(f"ringlet validate {case}: no such case")
+    passed = all(found["passed"] for found in cases)
+    if json:
+        print_json({"passed": passed, "cases": cases})
+    else:
+        _table(cases, _CASE)
+    return 0 if passed else 1
+
+
+@bench.command(name="simulate")
+def bench_simulate(
+    *,
+    guides: Count = 1024,
+    points: Count = 32,
+    precision: Literal["float32", "float64"] = "float32",
+    threads: Annotated[int, Parameter(help="0 for all processors.")] = 0,
+    json: Json = False,
+) -> None:
+    """Steps of guides on a head: nanoseconds for each point and step."""
+    from pipeline.bench.simulate import bench
+
+    _report(bench(guides=guides, points=points, precision=precision, threads=threads), json)
+
+
+@bench.command(name="interpolate")
+def bench_interpolate(*, strands: Count = 1_000_000, points: Count = 32, json: Json = False) -> None:
+    """Expansion of guides to the full count: seconds and memory for each frame."""
+    from pipeline.bench.interpolate import bench
+
+    _report(bench(strands=strands, points=points), json)
+
+
+@bench.command(name="render")
+def bench_render(
+    *,
+    strands: Count = 1_000_000,
+    points: Count = 16,
+    size: Annotated[str, Parameter(help="Width x height [px].")] = "1920x1080",
+    geometry: Literal["auto", "tubes", "ribbons", "lines"] = "lines",
+    samples: Annotated[int, Parameter(help="N for N x N supersampling.")] = 2,
+    json: Json = False,
+) -> None:
+    """One frame: seconds and memory."""
+    from pipeline.bench.render import bench
+
+    found = bench(strands=strands, points=points, size=_size(size), geometry=geometry, samples=samples)
+    _report(found, json)
+
+
+@app.command(group=CHECK_GROUP)
+def compare(
+    reference: Annotated[Path, Parameter(help="A PNG, or a folder of them.")],
+    picture: Annotated[Path, Parameter(help="What is compared with it.")],
+    *,
+    page: Annotated[Path | None, Parameter(help="Write an HTML page of what differs.")] = None,
+    json: Json = False,
+) -> int:
+    """Compare two pictures or two folders; exit code 1 when a pixel differs."""
+    from pipeline.compare import compare as compare_pictures
+
+    found = compare_pictures(reference, picture, page)
+    if json:
+        print_json(found.as_json())
+        return 0 if found.identical else 1
+    for pair in found.pairs:
+        figures = vars(pair.metrics).items() if pair.metrics else ()
+        print(f"{pair.name:<16}", "  ".join(f"{name} {value:.5f}" for name, value in figures) or "missing")
+    return 0 if found.identical else 1
+
+
+@app.command(group=CHECK_GROUP)
+def doctor(*, json: Json = False) -> int:
+    """Check compiler, OpenGL, memory, disk and kernels; tell the command that brings what is missing."""
+    from pipeline.cli.doctor import examine
+
+    checks = examine()
+    passed = all(check.passed for check in checks)
+    if json:
+        print_json({"passed": passed, "checks": [asdict(check) for check in checks]})
+        return 0 if passed else 1
+    for check in checks:
+        print(f"{'ok     ' if check.passed else 'MISSING'} {check.name:<16} {check.found}")
+        if not check.passed:
+            print(f"{'':<25}{check.remedy}")
+    return 0 if passed else 1
+
+
+def _report(figures: dict[str, Any], json: bool) -> None:
+    if json:
+        print_json(figures)
+        return
+    for name, value in figures.items():
+        print(f"{name:<22} {value:.4g}" if isinstance(value, float) else f"{name:<22} {value}")
+
+
+def _table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> None:
+    cells = [columns] + [tuple(_cell(row[name]) for name in columns) for row in rows]
+    widths = [max(len(row[index]) for row in cells) for index in range(len(columns))]
+    for row in cells:
+        print("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "NO"
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    try:
+        return int(width), int(height)
+    except ValueError:
+        raise InputError(f"--size {text}: expected width x height, such as 1920x1080") from None

@@ -1,0 +1,110 @@
+"""Commands that look and change nothing: status, plan, config, inspect."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from pipeline.cli.base import (
+    LOOK_GROUP,
+    OUTPUTS,
+    ConfigFile,
+    Json,
+    Outputs,
+    Settings,
+    app,
+    experiment_of,
+    load_config,
+    print_json,
+)
+from pipeline.errors import InputError
+
+
+@app.command(group=LOOK_GROUP, sort_key=1)
+def status(
+    config: ConfigFile,
+    *,
+    settings: Settings = (),
+    outputs: Outputs = OUTPUTS,
+    json: Json = False,
+) -> None:
+    """Tell which stages are fresh, and which value made the others stale."""
+    from pipeline.cli.stages import Batch
+
+    loaded = load_config(config, settings)
+    states = Batch(loaded.config, experiment_of(loaded, outputs)).states()
+    if json:
+        stages = [{"name": s.name, "fresh": s.fresh, "reason": s.reason} for s in states]
+        print_json({"name": loaded.config.name, "stages": stages})
+        return
+    for state in states:
+        print(f"{state.name:<12} {'fresh' if state.fresh else 'stale: ' + state.reason}")
+
+
+@app.command(group=LOOK_GROUP, sort_key=2)
+def plan(config: ConfigFile, *, settings: Settings = (), json: Json = False) -> None:
+    """Estimate memory, disk and time of every stage before anything runs."""
+    from pipeline.cli.plan import estimate
+
+    costs = estimate(load_config(config, settings).config)
+    if json:
+        print_json(costs)
+        return
+    print(f"{'':<12} {'peak memory':>12} {'disk':>12} {'time':>12}")
+    for name, cost in {**costs["stages"], "in all": costs}.items():
+        disk, memory = f"{cost['disk_gb']:.3f} GB", f"{cost['peak_rss_gb']:.2f} GB"
+        print(f"{name:<12} {memory:>12} {disk:>12} {cost['seconds']:>10.0f} s")
+
+
+@app.command(group=LOOK_GROUP, sort_key=3)
+def config(
+    config: Annotated[Path | None, Parameter(help="A config, such as configs/default.toml.")] = None,
+    *,
+    schema: Annotated[bool, Parameter(negative="", help="Print the JSON schema for editors.")] = False,
+    settings: Settings = (),
+    json: Json = False,
+) -> None:
+    """Show every resolved value and the file:line that it comes from."""
+    if schema:
+        from pipeline.config.export import schema_text
+
+        print(schema_text(), end="")
+        return
+    if config is None:
+        raise InputError("ringlet config: give a config, or --schema")
+    from pipeline.config.export import resolved
+
+    values = resolved(load_config(config, settings))
+    if json:
+        print_json({key: {"value": value, "origin": origin} for key, (value, origin) in values.items()})
+        return
+    width = max(len(f"{key} = {value}") for key, (value, _) in values.items() if len(str(value)) < 40)
+    for key, (value, origin) in values.items():
+        print(f"{f'{key} = {value}':<{width}}  # {origin}")
+
+
+@app.command(group=LOOK_GROUP, sort_key=4)
+def inspect(
+    file: Annotated[Path, Parameter(help="A file of outputs/: groom.h5, guides.h5, strands.h5 or a frame.")],
+    *,
+    json: Json = False,
+) -> int:
+    """Show what is in a file, with every checksum verified; exit code 1 when it is damaged."""
+    from pipeline.cli.inspect import contents
+
+    found = contents(file)
+    if json:
+        print_json(found)
+    else:
+        _print_contents(found)
+    return 0 if found["valid"] else 1
+
+
+def _print_contents(found: dict[str, Any]) -> None:
+    for name, value in found.items():
+        if isinstance(value, dict):
+            print(f"{name}:")
+            for key, item in value.items():
+                print(f"  {key:<28} {item}")
+        elif value is not None:
+            print(f"{name + ':':<12} {value}")

@@ -1,0 +1,101 @@
+"""What a config will cost, from formulas that are linear in the counts.
+
+The coefficients were fitted on two cores with AVX-512; they tell minutes from hours, not seconds apart.
+"""
+
+import os
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pipeline.config import Config
+
+_GB = 1e9
+_FITTED_THREADS = 2
+_START_S = 0.8  # interpreter, libraries
+_START_GB = 0.20
+_VTK_GB = 0.35
+_DEFLATED = 0.85  # float32 positions after shuffle and deflate
+_HEAD_M3 = 0.02  # box around a head that holds its distance grid
+
+_GROOM_S_PER_POINT = 3e-6
+_CONTACT_S_PER_VOXEL = 1e-6
+_STEP_S_PER_POINT = 40e-9
+_BIND_S_PER_STRAND = 10e-6
+_RENDER_S_PER_POINT = 0.25e-6
+_RENDER_S_PER_SAMPLE = 0.06e-6
+_RENDER_B_PER_POINT = 40
+_RENDER_B_PER_SAMPLE = 60
+_PNG_B_PER_PIXEL = 1.2
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Peak memory [GB], disk [GB] and wall time [s] of one stage."""
+
+    peak_rss_gb: float
+    disk_gb: float
+    seconds: float
+
+
+def estimate(config: Config) -> dict[str, Any]:
+    """Estimate {"peak_rss_gb", "disk_gb", "seconds"} in all and, under "stages", for each stage."""
+    stages = {
+        "groom": _groom(config),
+        "simulate": _simulate(config),
+        "interpolate": _interpolate(config),
+        "render": _render(config),
+    }
+    return {
+        "peak_rss_gb": max(cost.peak_rss_gb for cost in stages.values()),
+        "disk_gb": sum(cost.disk_gb for cost in stages.values()),
+        "seconds": sum(cost.seconds for cost in stages.values()),
+        "stages": {name: asdict(cost) for name, cost in stages.items()},
+    }
+
+
+def _groom(config: Config) -> Cost:
+    points = config.groom.strands * config.groom.points
+    voxels = 0.0 if config.scene.head == "none" else _HEAD_M3 / config.simulate.contact.spacing**3
+    seconds = _START_S + _GROOM_S_PER_POINT * points + _CONTACT_S_PER_VOXEL * voxels
+    stored = (12 * points + 4 * voxels) * _DEFLATED
+    return Cost(_START_GB + 6 * 12 * points / _GB, stored / _GB, seconds)
+
+
+def _simulate(config: Config) -> Cost:
+    simulate = config.simulate
+    points = config.groom.guides * config.groom.points
+    steps = (simulate.frames + simulate.settle * simulate.fps) * simulate.substeps
+    seconds = _START_S + _STEP_S_PER_POINT * points * steps * _slower()
+    return Cost(_START_GB + 1000 * points / _GB, simulate.frames * 12 * points * _DEFLATED / _GB, seconds)
+
+
+def _interpolate(config: Config) -> Cost:
+    strands = _strands(config)
+    row = 28 + 8 * config.interpolate.guides_per_strand
+    return Cost(
+        _START_GB + 10 * row * strands / _GB,
+        row * strands * _DEFLATED / _GB,
+        _START_S + _BIND_S_PER_STRAND * strands,
+    )
+
+
+def _render(config: Config) -> Cost:
+    render, frames = config.render, config.simulate.frames
+    points = _strands(config) * config.groom.points * render.subdivide
+    pixels = render.size[0] * render.size[1]
+    samples = pixels * render.samples**2
+    frame = _RENDER_S_PER_POINT * points * _slower() + _RENDER_S_PER_SAMPLE * samples * _slower()
+    memory = _RENDER_B_PER_POINT * points + _RENDER_B_PER_SAMPLE * samples
+    return Cost(
+        _START_GB + _VTK_GB + memory / _GB,
+        frames * pixels * _PNG_B_PER_PIXEL / _GB,
+        _START_S + frames * frame,
+    )
+
+
+def _strands(config: Config) -> int:
+    return config.interpolate.strands or config.groom.strands
+
+
+def _slower() -> float:
+    return _FITTED_THREADS / len(os.sched_getaffinity(0))

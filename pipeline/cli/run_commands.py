@@ -1,0 +1,137 @@
+"""Commands that make something: run, one per stage, movie, sheet, and what make needs."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from pipeline.cli.base import (
+    OUTPUTS,
+    STAGES_GROUP,
+    ConfigFile,
+    Outputs,
+    Settings,
+    app,
+    experiment_of,
+    load_config,
+)
+from pipeline.errors import InputError
+
+FrameRange = Annotated[
+    str, Parameter(show_default=False, help='Only these frames, counted from 1: "10-20", or one, "7".')
+]
+Stage = Annotated[str, Parameter(help="The last stage to run: groom, simulate, interpolate or render.")]
+
+
+@app.command(group=STAGES_GROUP, sort_key=1)
+def run(
+    config: ConfigFile,
+    *,
+    until: Stage = "render",
+    frames: FrameRange = "",
+    settings: Settings = (),
+    outputs: Outputs = OUTPUTS,
+) -> None:
+    """Run all stages that are not fresh."""
+    _make(config, until, settings, outputs, frames, everything=True)
+
+
+@app.command(group=STAGES_GROUP, sort_key=2)
+def groom(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+    """Stage 1: all strands at rest on the head."""
+    _make(config, "groom", settings, outputs)
+
+
+@app.command(group=STAGES_GROUP, sort_key=3)
+def simulate(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+    """Stage 2: the guides in motion."""
+    _make(config, "simulate", settings, outputs)
+
+
+@app.command(group=STAGES_GROUP, sort_key=4)
+def interpolate(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+    """Stage 3: which guides move which strand."""
+    _make(config, "interpolate", settings, outputs)
+
+
+@app.command(group=STAGES_GROUP, sort_key=5)
+def render(
+    config: ConfigFile,
+    *,
+    frames: FrameRange = "",
+    settings: Settings = (),
+    outputs: Outputs = OUTPUTS,
+) -> None:
+    """Stage 4: the frames as PNG files."""
+    _make(config, "render", settings, outputs, frames)
+
+
+@app.command(group=STAGES_GROUP, sort_key=6)
+def movie(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+    """Put the frames together: an .mp4 where PyAV is installed, else an animated PNG."""
+    from pipeline.render.movie import write_movie
+
+    loaded = load_config(config, settings)
+    experiment = experiment_of(loaded, outputs)
+    print(write_movie(_rendered(experiment.frames), experiment.folder, loaded.config.simulate.fps))
+
+
+@app.command(group=STAGES_GROUP, sort_key=7)
+def sheet(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+    """Put small copies of the frames on one page: the contact sheet."""
+    from pipeline.render.movie import write_sheet
+
+    experiment = experiment_of(load_config(config, settings), outputs)
+    print(write_sheet(_rendered(experiment.frames), experiment.folder))
+
+
+@app.command(group=STAGES_GROUP, sort_key=8)
+def keys(config: ConfigFile, *, outputs: Outputs = OUTPUTS) -> None:
+    """Write the stamps and rules that make reads: outputs/<name>/keys/ and targets.mk."""
+    from pipeline.cli.stamps import write_stamps
+
+    loaded = load_config(config, ())
+    write_stamps(config, loaded, experiment_of(loaded, outputs))
+
+
+def _make(
+    config: Path,
+    stage: str,
+    settings: tuple[str, ...],
+    outputs: Path,
+    frames: str = "",
+    everything: bool = False,
+) -> None:
+    """Make a stage and whatever it needs; `everything` also makes the stages before it that it does not need."""
+    from pipeline.cli.stages import NEEDS, Batch
+    from pipeline.config import STAGES
+
+    if stage not in STAGES:
+        raise InputError(f"--until {stage}: expected one of {', '.join(STAGES)}")
+    loaded = load_config(config, settings)
+    wanted = _frame_range(frames, loaded.config.simulate.frames)
+    batch = Batch(loaded.config, experiment_of(loaded, outputs))
+    before = STAGES[: STAGES.index(stage)] if everything else NEEDS[stage]
+    for name in before:
+        batch.make(name, touch=everything)
+    batch.make(stage, wanted if stage == "render" else None)
+
+
+def _frame_range(text: str, count: int) -> tuple[int, int] | None:
+    if not text:
+        return None
+    first, dash, last = text.partition("-")
+    try:
+        wanted = int(first), int(last if dash else first)
+    except ValueError:
+        raise InputError(f'--frames {text}: expected a range such as "10-20" or a number') from None
+    if not 1 <= wanted[0] <= wanted[1] <= count:
+        raise InputError(f"--frames {text}: expected a range within 1-{count}")
+    return wanted
+
+
+def _rendered(folder: Path) -> list[Path]:
+    frames = sorted(folder.glob("[0-9]*.png"))
+    if not frames:
+        raise InputError(f"{folder}: no frames yet; `ringlet run` makes them")
+    return frames

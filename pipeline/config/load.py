@@ -1,0 +1,142 @@
+"""Load a config: strict TOML, `extends`, `-s key=value`; whatever is wrong is told at once, with file:line."""
+
+import difflib
+import json
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from pipeline.config.complaints import complaints
+from pipeline.config.schema import Config
+from pipeline.config.toml_lines import key_lines
+from pipeline.config.tree import KeyPath, Tree, dotted, parse_key
+from pipeline.errors import InputError
+
+FILES: dict[tuple[str, str], tuple[str, ...]] = {  # keys that name a file, and the words that do not
+    ("scene", "head"): ("builtin", "none"),
+    ("groom", "source"): ("procedural", "swatch"),
+}
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A config, the "file:line" that each of its keys comes from, and all files that it was read from."""
+
+    config: Config
+    origins: dict[str, str]
+    files: tuple[Path, ...]
+
+
+def load(path: Path, overrides: tuple[str, ...] = ()) -> Loaded:
+    """Read a config file and what it extends, then apply `key=value` overrides.
+
+    The name is the file's stem unless the file itself sets one: an experiment never shares a folder with
+    the one that it extends. Raises InputError that tells everything wrong, one line each.
+    """
+    files: list[Path] = []
+    tree = _read(path, files)
+    for override in overrides:
+        _override(tree, override)
+    missing = [message for key, words in FILES.items() if (message := _resolve(tree, key, words))]
+    try:
+        config = Config.model_validate_json(json.dumps(tree.values, default=str), strict=True)
+    except ValidationError as error:
+        raise InputError.joined(missing + complaints(error, tree, path)) from None
+    if missing:
+        raise InputError.joined(missing)
+    origins = {dotted(key): origin for key, origin in tree.origins.items()}
+    return Loaded(config, origins, tuple(files))
+
+
+def _read(path: Path, files: list[Path]) -> Tree:
+    if path.resolve() in (file.resolve() for file in files):
+        chain = " -> ".join(str(file) for file in [*files, path])
+        raise InputError(f"{files[-1]}: extends: goes round in circles: {chain}")
+    files.append(path)
+    text = _text(path)
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(_syntax(path, text, str(error))) from None
+    lines = {key: f"{path}:{line}" for key, line in key_lines(text).items()}
+    values.setdefault("name", path.stem)
+    own = Tree(values, lines)
+    own.anchor = dict.fromkeys(FILES, path.parent)
+    parent = values.pop("extends", None)
+    if parent is None:
+        return own
+    where = f"{lines['extends',]}: extends"
+    if not isinstance(parent, str):
+        raise InputError(f'{where}: expected the name of a config, such as "default.toml"')
+    if not (path.parent / parent).is_file():
+        raise InputError(f"{where}: no such file: {path.parent / parent}{_similar(path.parent / parent)}")
+    tree = _read(path.parent / parent, files)
+    tree.update(own)
+    return tree
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such config{_similar(path)}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a text file ({error})") from None
+
+
+def _similar(path: Path) -> str:
+    names = [file.name for file in path.parent.glob("*.toml")]
+    close = difflib.get_close_matches(path.name, names, 1, cutoff=0.7)
+    return f"; did you mean {path.parent / close[0]}?" if close else ""
+
+
+def _syntax(path: Path, text: str, message: str) -> str:
+    match = re.search(r" \(at line (\d+), column \d+\)", message)
+    line = int(match[1]) if match else text.count("\n") + 1
+    return f"{path}:{line}: not TOML: {message[: match.start()] if match else message}"
+
+
+def _override(tree: Tree, override: str) -> None:
+    key, equals, value = override.partition("=")
+    if not equals or not key.strip():
+        raise InputError(f'-s {override}: expected key=value, such as -s "groom.cut.length=20 cm"')
+    path = parse_key(key.strip())
+    try:
+        tree.set(path, _scalar(value.strip()), f"-s {dotted(path)}", _defaults)
+    except LookupError as error:
+        raise InputError(f"-s {key.strip()}: {error.args[0]}") from None
+    if path in FILES:
+        tree.anchor[path] = Path.cwd()
+
+
+def _scalar(value: str) -> Any:
+    """Read a TOML value; what is none is a string, so that quotes are not needed in a shell."""
+    try:
+        return tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return value
+
+
+def _defaults(path: KeyPath) -> Any:
+    """Look up the default of a list, of which an override sets one element."""
+    value: Any = Config(name="default").model_dump(mode="json")
+    for part in path:
+        value = value[part]
+    return value
+
+
+def _resolve(tree: Tree, key: KeyPath, words: tuple[str, ...]) -> str | None:
+    """Make a file's path absolute, relative to the config that names it; return what is wrong with it."""
+    value = tree.get(key)
+    if not isinstance(value, str) or value in words:
+        return None
+    file = (tree.anchor[key] / Path(value).expanduser()).resolve()
+    tree.replace(key, str(file))
+    if file.is_file():
+        return None
+    listed = ", ".join(f'"{word}"' for word in words)
+    return f"{tree.label(key)}: no such file: {file}; give a file or one of {listed}"

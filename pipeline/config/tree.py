@@ -1,0 +1,106 @@
+"""The values of a config before validation, and where each of them was set."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+KeyPath = tuple[str | int, ...]
+
+
+class Tree:
+    """Nested tables, the origin ("file:line") of every key, and the folder that file names are relative to."""
+
+    def __init__(self, values: dict[str, Any], origins: dict[KeyPath, str]) -> None:
+        self.values, self.origins = values, origins
+        self.anchor: dict[KeyPath, Path] = {}
+
+    def get(self, path: KeyPath) -> Any:
+        """Return the value at a path, or None."""
+        value: Any = self.values
+        for part in path:
+            try:
+                value = value[part]
+            except (LookupError, TypeError):
+                return None
+        return value
+
+    def where(self, path: KeyPath) -> str:
+        """Return the origin of a key, or of the innermost table around it that has one, or ""."""
+        for length in range(len(path), 0, -1):
+            if path[:length] in self.origins:
+                return self.origins[path[:length]]
+        return ""
+
+    def label(self, path: KeyPath) -> str:
+        """Return "file:line: key" for a message, or "-s key" for a value from the command line."""
+        where, name = self.where(path), dotted(path)
+        return where if where == f"-s {name}" else ": ".join(part for part in (where, name) if part)
+
+    def update(self, other: "Tree") -> None:
+        """Lay another tree over this one: tables merge, everything else is replaced whole."""
+        self._merge(self.values, other.values, ())
+        self.origins |= other.origins
+        for path, folder in other.anchor.items():
+            if other.get(path) is not None:
+                self.anchor[path] = folder
+
+    def _merge(self, mine: dict[str, Any], theirs: dict[str, Any], path: KeyPath) -> None:
+        for name, value in theirs.items():
+            if isinstance(value, dict) and isinstance(mine.get(name), dict):
+                self._merge(mine[name], value, (*path, name))
+            else:
+                self._forget((*path, name))
+                mine[name] = value
+
+    def _forget(self, path: KeyPath) -> None:
+        self.origins = {key: origin for key, origin in self.origins.items() if key[: len(path)] != path}
+
+    def replace(self, path: KeyPath, value: Any) -> None:
+        """Change a value that exists, keeping its origin."""
+        container = self.get(path[:-1])
+        container[path[-1]] = value
+
+    def set(self, path: KeyPath, value: Any, origin: str, default: Callable[[KeyPath], Any]) -> None:
+        """Set one value, making the tables above it; an element of an unset list is set in its default.
+
+        Raises LookupError with a sentence when the path leads through something that is no table or list.
+        """
+        inside: Any = self.values
+        for depth, part in enumerate(path[:-1]):
+            if isinstance(path[depth + 1], int) and isinstance(inside, dict) and part not in inside:
+                try:
+                    inside[part] = default(path[: depth + 1])
+                except (LookupError, TypeError):
+                    raise LookupError(f"there is no list {dotted(path[: depth + 1])}") from None
+            inside = (
+                inside.setdefault(part, {}) if isinstance(inside, dict) else _element(inside, path, depth)
+            )
+        if isinstance(inside, dict):
+            inside[path[-1]] = value
+        else:
+            _element(inside, path, len(path) - 1)
+            inside[path[-1]] = value
+        self._forget(path)
+        self.origins[path] = origin
+
+
+def _element(inside: Any, path: KeyPath, depth: int) -> Any:
+    part = path[depth]
+    if not isinstance(inside, list) or not isinstance(part, int):
+        raise LookupError(f"{dotted(path[:depth])} is not a table")
+    if not 0 <= part < len(inside):
+        raise LookupError(f"{dotted(path[:depth])} has {len(inside)} elements, counted from 0")
+    return inside[part]
+
+
+def dotted(path: KeyPath) -> str:
+    """Write a path as in "scene.lights[0].irradiance"."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+def parse_key(text: str) -> KeyPath:
+    """Read "scene.lights[0].irradiance" or "scene.lights.0.irradiance"."""
+    parts = re.split(r"[.\[\]]+", text.rstrip("]"))
+    return tuple(int(part) if part.isdigit() else part for part in parts)

@@ -1,0 +1,117 @@
+// All strands over the steps of a drive: blocks in parallel, each through all steps before the next.
+//
+// A block reads its strands, steps, and writes them back; blocks share nothing but what they read, so that no result
+// depends on the number of threads.
+#pragma once
+
+#include "step.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace ringlet {
+
+/// The caller's arrays of a state.
+template <class Real> struct StateArrays {
+    Real *points, *velocity, *tension;
+    uint8_t *contact;
+};
+
+/// What moves the strands: `steps + 1` poses of head and hand, `steps` winds.
+struct Drive {
+    int steps = 0;
+    std::vector<Pose> head, hand;
+    std::vector<double> wind; // (steps, 3) [m/s]
+};
+
+struct Report {
+    double strain = 0, depth = 0, rounds = 0, contacts = 0, solves = 0;
+    int rounds_max = 0;
+    long halvings = 0;
+    int bad_strand = -1;
+};
+
+template <class Real> void read(Motion<Real> &motion, const StateArrays<Real> &state, int P, const BlockIndex<Real> &index) {
+    gather(motion.x, state.points, P, index.strand);
+    gather(motion.v, state.velocity, P, index.strand);
+    gather<Real>(motion.T, state.tension, P - 1, P - 1, index.strand);
+    gather<Real>(motion.touch, state.contact, P, P, index.strand);
+}
+
+template <class Real> void write(const Motion<Real> &motion, StateArrays<Real> &state, int P, const BlockIndex<Real> &index) {
+    scatter(motion.x, state.points, P, index);
+    scatter(motion.v, state.velocity, P, index);
+    scatter<Real>(motion.T, state.tension, P - 1, index);
+    scatter<Real>(motion.touch, state.contact, P, index);
+}
+
+/// Lanes that hold a strand of their own (the last block repeats its last strand).
+template <class Real> Mask<Real> own_lanes(const BlockIndex<Real> &index) {
+    Mask<Real> own{};
+    for (int lane = 0; lane < index.count; ++lane) own[lane] = -1;
+    return own;
+}
+
+/// Steps one block of strands through the whole drive.
+template <class Real>
+void advance_block(Stepper<Real> &stepper, const BlockIndex<Real> &index, StateArrays<Real> &state, const RestShape &rest,
+                   const Drive &drive, const StepSettings &settings) {
+    stepper.tally = {};
+    read(stepper.block, rest, index);
+    read(stepper.now, state, rest.P, index);
+    stepper.contacts.forget(rest.P);
+    for (int k = 0; k < drive.steps; ++k) {
+        const Poses poses{{drive.head[k], drive.head[k + 1]}, {drive.hand[k], drive.hand[k + 1]}};
+        stepper.step({settings.dt, poses, broadcast<Real>(settings.gravity), broadcast<Real>(&drive.wind[3 * k])},
+                     own_lanes(index));
+    }
+    write(stepper.now, state, rest.P, index);
+}
+
+/// Adds up the tallies of all blocks, in order.
+template <class Real> Report summarise(const std::vector<Tally<Real>> &tallies, int steps) {
+    Report report;
+    const double block_steps = std::max(1.0, double(tallies.size()) * steps);
+    for (const Tally<Real> &tally : tallies) {
+        report.strain = std::max(report.strain, double(largest<Real>(tally.strain)));
+        report.depth = std::max(report.depth, double(largest<Real>(tally.depth)));
+        report.rounds += tally.rounds / block_steps;
+        report.solves += tally.solves / block_steps;
+        report.contacts += tally.contacts / std::max(1, steps);
+        report.halvings += tally.halvings;
+        report.rounds_max = std::max(report.rounds_max, tally.rounds_max);
+    }
+    return report;
+}
+
+/// Index of the first strand with a number that is not finite, or -1.
+template <class Real> int first_bad_strand(const StateArrays<Real> &state, int S, int P) {
+    const size_t row = size_t(P) * 3;
+    for (size_t k = 0; k < S * row; ++k)
+        if (!std::isfinite(state.points[k]) || !std::isfinite(state.velocity[k])) return int(k / row);
+    return -1;
+}
+
+/// Advances the state in place by the steps of the drive.
+template <class Real>
+Report advance(StateArrays<Real> state, const RestShape &rest, const DistanceField *field, const Drive &drive,
+               const StepSettings &settings, int threads) {
+    const int blocks = block_count<Real>(rest.S);
+    std::vector<Tally<Real>> tallies(blocks);
+#pragma omp parallel num_threads(threads)
+    {
+        Arena arena(Stepper<Real>::bytes(rest.P));
+        Stepper<Real> stepper(arena, rest.P, settings, field);
+#pragma omp for schedule(dynamic, 1)
+        for (int block = 0; block < blocks; ++block) {
+            advance_block(stepper, BlockIndex<Real>(block, rest.S), state, rest, drive, settings);
+            tallies[block] = stepper.tally;
+        }
+    }
+    Report report = summarise(tallies, drive.steps);
+    report.bad_strand = first_bad_strand(state, rest.S, rest.P);
+    return report;
+}
+
+} // namespace ringlet

@@ -1,0 +1,288 @@
+// Python's view of the step: state, distance field, drive, settings, `advance` and its report.
+#include "bindings.hpp"
+
+#include "advance.hpp"
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <tuple>
+
+namespace ringlet {
+
+using Doubles = nb::ndarray<nb::numpy, double>;
+using Reals = nb::ndarray<nb::numpy, nb::c_contig, nb::device::cpu>;
+using Flags = nb::ndarray<nb::numpy, uint8_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+using Matrices = Array<const double, -1, 4, 4>;
+
+/// Python's state: it holds the caller's arrays.
+struct State {
+    Reals points, velocity, tension;
+    Flags contact;
+
+    size_t S() const { return points.shape(0); }
+    size_t P() const { return points.shape(1); }
+    bool single() const { return points.dtype() == nb::dtype<float>(); }
+
+    template <class Real> StateArrays<Real> arrays() const {
+        return {static_cast<Real *>(points.data()), static_cast<Real *>(velocity.data()),
+                static_cast<Real *>(tension.data()), contact.data()};
+    }
+};
+
+static bool is_points(const Reals &a) { return a.ndim() == 3 && a.shape(2) == 3; }
+
+static State make_state(Reals points, Reals velocity, Reals tension, Flags contact) {
+    require(is_points(points) && is_points(velocity), "State: expected points and velocity (S, P, 3)");
+    const size_t S = points.shape(0), P = points.shape(1);
+    require(velocity.shape(0) == S && velocity.shape(1) == P, "State: velocity has another shape than points");
+    require(tension.ndim() == 2 && tension.shape(0) == S && tension.shape(1) + 1 == P, "State: expected tension (S, P-1)");
+    require(contact.shape(0) == S && contact.shape(1) == P, "State: expected contact (S, P)");
+    require(points.dtype() == nb::dtype<float>() || points.dtype() == nb::dtype<double>(),
+            "State: expected float32 or float64");
+    require(velocity.dtype() == points.dtype() && tension.dtype() == points.dtype(),
+            "State: points, velocity and tension must have one precision");
+    return {points, velocity, tension, contact};
+}
+
+template <class Real> static State resting(const Reals &points) {
+    const size_t S = points.shape(0), P = points.shape(1);
+    auto x = new_array<Real>({S, P, size_t(3)}), v = new_array<Real>({S, P, size_t(3)}), T = new_array<Real>({S, P - 1});
+    auto contact = new_array<uint8_t>({S, P});
+    std::copy_n(static_cast<const Real *>(points.data()), S * P * 3, x.data());
+    return {Reals(x), Reals(v), Reals(T), Flags(contact)};
+}
+
+static State at_rest(const Reals &points) {
+    require(is_points(points), "at_rest: expected points (S, P, 3)");
+    if (points.dtype() == nb::dtype<float>()) return resting<float>(points);
+    require(points.dtype() == nb::dtype<double>(), "at_rest: expected float32 or float64");
+    return resting<double>(points);
+}
+
+static DistanceField make_field(Array<const float, -1, -1, -1> values, Array<const double, 3> origin, double spacing) {
+    DistanceField field;
+    for (int axis = 0; axis < 3; ++axis) {
+        field.n[axis] = int(values.shape(axis));
+        field.origin[axis] = origin.data()[axis];
+        require(field.n[axis] >= 2, "DistanceField: expected at least 2 nodes along each axis");
+    }
+    require(values.size() < size_t(1) << 31, "DistanceField: expected fewer than 2^31 nodes");
+    require(spacing > 0 && std::isfinite(spacing), "DistanceField: expected a positive spacing");
+    field.spacing = spacing;
+    field.values.assign(values.data(), values.data() + values.size());
+    require(std::all_of(field.values.begin(), field.values.end(), [](float v) { return std::isfinite(v); }),
+            "DistanceField: a value is not finite");
+    field.measure_slope();
+    return field;
+}
+
+static std::tuple<Doubles, Doubles> distance(const DistanceField &field, Array<const double, -1, 3> points) {
+    const int N = int(points.shape(0)), W = kLanes<double>;
+    auto values = new_array<double>({size_t(N)}), normals = new_array<double>({size_t(N), 3});
+    for (int begin = 0; begin < N; begin += W) {
+        BlockIndex<double> index(begin / W, N);
+        Vec3<double> x, gradient;
+        Lanes<double> phi;
+        gather(&x, points.data(), 1, index.strand);
+        sample<double>(field, x, phi, gradient);
+        gradient = (1 / square_root<double>(dot(gradient, gradient) + 1e-300)) * gradient;
+        scatter(&phi, values.data(), 1, index);
+        scatter(&gradient, normals.data(), 1, index);
+    }
+    return {values, normals};
+}
+
+static Drive make_drive(Matrices head, Array<const double, -1, 3> wind, std::optional<Matrices> hand) {
+    require(head.shape(0) >= 1 && head.shape(0) == wind.shape(0) + 1, "Drive: expected head (n+1, 4, 4) and wind (n, 3)");
+    require(!hand || hand->shape(0) == head.shape(0), "Drive: expected hand (n+1, 4, 4)");
+    Drive drive;
+    drive.steps = int(wind.shape(0));
+    drive.wind.assign(wind.data(), wind.data() + wind.size());
+    for (size_t k = 0; k < head.shape(0); ++k) {
+        drive.head.push_back(Pose::of(head.data() + 16 * k));
+        drive.hand.push_back(Pose::of((hand ? hand->data() : head.data()) + 16 * k));
+    }
+    return drive;
+}
+
+static void check_settings(const StepSettings &s) {
+    require(s.dt > 0 && std::isfinite(s.dt), "settings: dt must be positive");
+    require(s.theta >= 0.5 && s.theta <= 1, "settings: theta must be from 0.5 to 1");
+    require(s.tolerance > 0, "settings: tolerance must be positive");
+    require(s.damping >= 0 && s.friction >= 0, "settings: damping and friction must not be negative");
+    require(s.drag >= 0 && s.drag_speed >= 0 && s.drag_along >= 0, "settings: drag must not be negative");
+}
+
+static void check_fits(const State &state, const RestShape &rest) {
+    require(int(state.S()) == rest.S && int(state.P()) == rest.P, "state and rest shape have different numbers of strands or points");
+}
+
+static Report advance_state(State &state, const RestShape &rest, const DistanceField *field, const Drive &drive,
+                            const StepSettings &settings) {
+    check_fits(state, rest);
+    check_settings(settings);
+    nb::gil_scoped_release release;
+    if (state.single()) return advance(state.arrays<float>(), rest, field, drive, settings, threads());
+    return advance(state.arrays<double>(), rest, field, drive, settings, threads());
+}
+
+/// Bending, torsion, kinetic and gravity energy of a block of strands.
+static void block_energies(const Block<double> &b, const Motion<double> &at, const StepSettings &settings,
+                           Edges<double> &edges, Lanes<double> (&energy)[4]) {
+    const Vec3<double> g = broadcast<double>(settings.gravity);
+    edges.set(at.x, b.P);
+    energy[0] = add_bending(b, edges);
+    energy[1] = add_torsion(settings.torsion, b, edges);
+    energy[2] = energy[3] = Lanes<double>{};
+    for (int i = 0; i < b.P; ++i) {
+        energy[2] += 0.5 * b.mu[i] * b.m0 * dot(at.v[i], at.v[i]);
+        energy[3] -= b.mu[i] * b.m0 * dot(g, at.x[i]);
+    }
+}
+
+template <class Real> static Doubles energies_of(const State &state, const RestShape &rest, const StepSettings &settings) {
+    const int P = rest.P;
+    auto values = new_array<double>({size_t(rest.S), 4});
+    Arena arena(sizeof(Lanes<double>) * 64 * (P + 8));
+    Block<double> block(arena, P);
+    Motion<double> at(arena, P);
+    Edges<double> edges(arena, P);
+    for (int k = 0; k < block_count<double>(rest.S); ++k) {
+        const BlockIndex<double> index(k, rest.S);
+        const StateArrays<Real> arrays = state.arrays<Real>();
+        Lanes<double> energy[4];
+        read(block, rest, index);
+        gather(at.x, arrays.points, P, index.strand);
+        gather(at.v, arrays.velocity, P, index.strand);
+        block_energies(block, at, settings, edges, energy);
+        scatter<double>(energy, values.data(), 4, index);
+    }
+    return values;
+}
+
+static Doubles energies(const State &state, const RestShape &rest, const StepSettings &settings) {
+    check_fits(state, rest);
+    return state.single() ? energies_of<float>(state, rest, settings) : energies_of<double>(state, rest, settings);
+}
+
+static Relaxation relaxation_named(const std::string &name) {
+    require(name == "newton" || name == "sweep", "relaxation: expected \"newton\" or \"sweep\"");
+    return name == "newton" ? Relaxation::newton : Relaxation::sweep;
+}
+
+static const std::map<std::string, Torsion> kTorsions = {
+    {"none", Torsion::none}, {"frenet", Torsion::frenet}, {"rotor", Torsion::rotor}};
+
+static std::string torsion_name(const StepSettings &settings) {
+    for (const auto &[name, torsion] : kTorsions)
+        if (torsion == settings.torsion) return name;
+    return {};
+}
+
+static void set_torsion(StepSettings &settings, const std::string &name) {
+    require(kTorsions.contains(name), "torsion: expected \"rotor\", \"frenet\" or \"none\"");
+    settings.torsion = kTorsions.at(name);
+}
+
+static std::tuple<Doubles, int> relax(Array<const double, -1, -1, 3> points, const RestShape &rest,
+                                      const std::string &method, double tolerance) {
+    require(int(points.shape(0)) == rest.S && int(points.shape(1)) == rest.P, "points: expected (S, P, 3) of the rest shape");
+    const bool newton = relaxation_named(method) == Relaxation::newton;
+    const int P = rest.P;
+    auto relaxed = new_array<double>({size_t(rest.S), size_t(P), 3});
+    Arena arena(sizeof(Lanes<double>) * 64 * (P + 8));
+    Block<double> block(arena, P);
+    Contacts<double> contacts(arena, P);
+    Lengths<double> lengths(arena, P);
+    auto *x = arena.take<Vec3<double>>(P);
+    int slowest = 0;
+    for (int k = 0; k < block_count<double>(rest.S); ++k) {
+        const BlockIndex<double> index(k, rest.S);
+        read(block, rest, index);
+        gather(x, points.data(), P, index.strand);
+        for (int round = 0; round < (newton ? 50 : kSweepRounds); ++round) {
+            Mask<double> busy = lengths.strain(block, x) > tolerance;
+            if (!any<double>(busy)) break;
+            if (newton) lengths.newton(block, contacts, busy, x);
+            else lengths.sweep(block, contacts, busy, x);
+            slowest = std::max(slowest, round + 1);
+        }
+        scatter(x, relaxed.data(), P, index);
+    }
+    return {relaxed, slowest};
+}
+
+static void bind_settings(nb::module_ &m) {
+    nb::class_<StepSettings> cls(m, "StepSettings");
+    cls.def(nb::init<>())
+        .def_rw("dt", &StepSettings::dt)
+        .def_rw("theta", &StepSettings::theta)
+        .def_rw("damping", &StepSettings::damping)
+        .def_rw("tolerance", &StepSettings::tolerance)
+        .def_rw("friction", &StepSettings::friction)
+        .def_rw("drag", &StepSettings::drag)
+        .def_rw("drag_speed", &StepSettings::drag_speed)
+        .def_rw("drag_along", &StepSettings::drag_along)
+        .def_prop_rw("torsion", &torsion_name, &set_torsion);
+    cls.def_prop_rw(
+        "gravity", [](const StepSettings &s) { return std::tuple(s.gravity[0], s.gravity[1], s.gravity[2]); },
+        [](StepSettings &s, std::tuple<double, double, double> g) { std::tie(s.gravity[0], s.gravity[1], s.gravity[2]) = g; });
+    cls.def_prop_rw(
+        "relaxation", [](const StepSettings &s) { return s.relaxation == Relaxation::newton ? "newton" : "sweep"; },
+        [](StepSettings &s, const std::string &name) { s.relaxation = relaxation_named(name); });
+    cls.def_prop_rw(
+        "integrator", [](const StepSettings &s) { return s.is_explicit ? "explicit" : "implicit"; },
+        [](StepSettings &s, const std::string &name) {
+            require(name == "explicit" || name == "implicit", "integrator: expected \"implicit\" or \"explicit\"");
+            s.is_explicit = name == "explicit";
+        });
+}
+
+static void bind_values(nb::module_ &m) {
+    nb::class_<State>(m, "State")
+        .def("__init__", [](State *self, Reals points, Reals velocity, Reals tension, Flags contact) {
+            new (self) State(make_state(points, velocity, tension, contact));
+        }, nb::arg("points").noconvert(), nb::arg("velocity").noconvert(), nb::arg("tension").noconvert(),
+             nb::arg("contact").noconvert())
+        .def_prop_ro("points", [](State &state) { return state.points; }, nb::rv_policy::automatic)
+        .def_prop_ro("velocity", [](State &state) { return state.velocity; }, nb::rv_policy::automatic)
+        .def_prop_ro("tension", [](State &state) { return state.tension; }, nb::rv_policy::automatic)
+        .def_prop_ro("contact", [](State &state) { return state.contact; }, nb::rv_policy::automatic);
+    nb::class_<DistanceField>(m, "DistanceField")
+        .def("__init__", [](DistanceField *self, Array<const float, -1, -1, -1> values, Array<const double, 3> origin, double spacing) {
+            new (self) DistanceField(make_field(values, origin, spacing));
+        }, nb::arg("values"), nb::arg("origin"), nb::arg("spacing"));
+    nb::class_<Drive>(m, "Drive")
+        .def("__init__", [](Drive *self, Matrices head, Array<const double, -1, 3> wind, std::optional<Matrices> hand) {
+            new (self) Drive(make_drive(head, wind, hand));
+        }, nb::arg("head"), nb::arg("wind"), nb::arg("hand") = nb::none());
+    nb::class_<Report>(m, "Report")
+        .def_ro("strain", &Report::strain)
+        .def_ro("depth", &Report::depth)
+        .def_ro("rounds", &Report::rounds)
+        .def_ro("rounds_max", &Report::rounds_max)
+        .def_ro("contacts", &Report::contacts)
+        .def_ro("solves", &Report::solves)
+        .def_ro("halvings", &Report::halvings)
+        .def_ro("bad_strand", &Report::bad_strand);
+}
+
+void bind_step(nb::module_ &m) {
+    bind_values(m);
+    bind_settings(m);
+    m.def("at_rest", &at_rest, nb::arg("points"));
+    m.def("distance", &distance, nb::arg("field"), nb::arg("points"));
+    m.def("advance", &advance_state, nb::arg("state"), nb::arg("rest"), nb::arg("field").none(), nb::arg("drive"),
+          nb::arg("settings"));
+    m.def("energies", &energies, nb::arg("state"), nb::arg("rest"), nb::arg("settings"));
+    m.def("relax", &relax, nb::arg("points"), nb::arg("rest"), nb::arg("method"), nb::arg("tolerance"));
+}
+
+} // namespace ringlet

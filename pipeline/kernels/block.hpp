@@ -1,0 +1,171 @@
+// One block of strands, a lane each: its state, its rest shape, and how arrays of strands are read and written.
+//
+// Notation (physics.md): x, v points and velocities; T tension of a segment; l its rest length; m mass of a point,
+// here in units of the strand's mean mass m0 (mu = m/m0, w = m0/m; 0 where the point is held).
+#pragma once
+
+#include "rest.hpp"
+#include "simd.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <new>
+
+namespace ringlet {
+
+/// Memory of one thread: handed out in aligned pieces, given back all at once.
+class Arena {
+  public:
+    explicit Arena(size_t bytes) : memory_(static_cast<std::byte *>(::operator new(bytes, kAlignment))), left_(bytes) {}
+
+    template <class T> T *take(size_t count) {
+        size_t bytes = (count * sizeof(T) + size_t(kAlignment) - 1) / size_t(kAlignment) * size_t(kAlignment);
+        if (bytes > left_) throw std::bad_alloc();
+        std::byte *piece = memory_.get() + used_;
+        used_ += bytes, left_ -= bytes;
+        T *items = reinterpret_cast<T *>(piece);
+        for (size_t i = 0; i < count; ++i) items[i] = T{};
+        return items;
+    }
+
+  private:
+    static constexpr std::align_val_t kAlignment{64};
+    struct Free {
+        void operator()(std::byte *p) const { ::operator delete(p, kAlignment); }
+    };
+    std::unique_ptr<std::byte, Free> memory_;
+    size_t used_ = 0, left_;
+};
+
+/// What a step changes.
+template <class Real> struct Motion {
+    Vec3<Real> *x, *v;
+    Lanes<Real> *T;     // tension of segment j, positive when pulled
+    Lanes<Real> *touch; // 1 where the head pushed the point in the last step
+
+    Motion(Arena &arena, int P)
+        : x(arena.take<Vec3<Real>>(P)), v(arena.take<Vec3<Real>>(P)), T(arena.take<Lanes<Real>>(P)),
+          touch(arena.take<Lanes<Real>>(P)) {}
+};
+
+/// What a step reads: the rest shape of the block's strands.
+template <class Real> struct Block {
+    int P;
+    int first = 0;            // points before this one are held in every lane
+    bool held_inside = false; // some lane holds a point after that
+    Lanes<Real> k_kappa, k_tau, m0;
+    Vec3<Real> *anchor;                 // rest position of a point
+    Lanes<Real> *l, *dl;                // length of segment j; mean length of the segments beside point i
+    Lanes<Real> *mu, *w;                // mass and mobility of a point, see above
+    Lanes<Real> *free, *hand, *offset;  // 1 where free; 1 where the hand holds; contact offset
+    Lanes<Real> *kappa_r, *tau_r;       // at point i
+    Lanes<Real> *C, *S, *rho, *G;       // "rotor" about segment i
+
+    Block(Arena &arena, int points) : P(points), anchor(arena.take<Vec3<Real>>(P)) {
+        for (auto **array : {&l, &dl, &mu, &w, &free, &hand, &offset, &kappa_r, &tau_r, &C, &S, &rho, &G})
+            *array = arena.take<Lanes<Real>>(P);
+    }
+};
+
+/// Copies `count` numbers of each strand of a block into lanes; lanes past the last strand repeat it.
+/// Strand s begins at source + s * stride.
+template <class Real, class Source>
+void gather(Lanes<Real> *to, const Source *source, int count, int stride, const int (&strand)[kLanes<Real>]) {
+    for (int lane = 0; lane < kLanes<Real>; ++lane) {
+        const Source *from = source + size_t(strand[lane]) * stride;
+        for (int i = 0; i < count; ++i) to[i][lane] = Real(from[i]);
+    }
+}
+
+template <class Real, class Source>
+void gather(Vec3<Real> *to, const Source *source, int count, const int (&strand)[kLanes<Real>]) {
+    for (int lane = 0; lane < kLanes<Real>; ++lane) {
+        const Source *from = source + size_t(strand[lane]) * count * 3;
+        for (int i = 0; i < count; ++i, from += 3) {
+            to[i].x[lane] = Real(from[0]);
+            to[i].y[lane] = Real(from[1]);
+            to[i].z[lane] = Real(from[2]);
+        }
+    }
+}
+
+/// The strands of a block: its lanes from `begin`; the last block is filled up with copies of its last strand.
+template <class Real> struct BlockIndex {
+    int begin, count, strand[kLanes<Real>];
+
+    BlockIndex(int block, int strands) : begin(block * kLanes<Real>), count(strands - begin) {
+        if (count > kLanes<Real>) count = kLanes<Real>;
+        for (int lane = 0; lane < kLanes<Real>; ++lane) strand[lane] = begin + (lane < count ? lane : count - 1);
+    }
+};
+
+template <class Real> int block_count(int strands) { return (strands + kLanes<Real> - 1) / kLanes<Real>; }
+
+template <class Real, class T>
+void scatter(const Lanes<Real> *from, T *target, int count, const BlockIndex<Real> &index) {
+    for (int lane = 0; lane < index.count; ++lane) {
+        T *to = target + size_t(index.begin + lane) * count;
+        for (int i = 0; i < count; ++i) to[i] = T(from[i][lane]);
+    }
+}
+
+template <class Real, class T>
+void scatter(const Vec3<Real> *from, T *target, int count, const BlockIndex<Real> &index) {
+    for (int lane = 0; lane < index.count; ++lane) {
+        T *to = target + size_t(index.begin + lane) * count * 3;
+        for (int i = 0; i < count; ++i, to += 3) {
+            to[0] = T(from[i].x[lane]);
+            to[1] = T(from[i].y[lane]);
+            to[2] = T(from[i].z[lane]);
+        }
+    }
+}
+
+/// Masses and held points in the form that the step uses.
+template <class Real> void derive(Block<Real> &b, const RestShape &rest, const int (&strand)[kLanes<Real>]) {
+    const Lanes<Real> one = splat(Real(1)), none = splat(Real(0));
+    Lanes<Real> sum = none;
+    for (int i = 0; i < b.P; ++i) sum += b.mu[i];
+    b.m0 = sum / Real(b.P);
+    bool leading = true;
+    b.first = 0, b.held_inside = false;
+    for (int i = 0; i < b.P; ++i) {
+        for (int lane = 0; lane < kLanes<Real>; ++lane) {
+            uint8_t held = rest.held[size_t(strand[lane]) * b.P + i];
+            b.free[i][lane] = held == 0;
+            b.hand[i][lane] = held == 2;
+        }
+        b.mu[i] = b.mu[i] / b.m0;
+        b.w[i] = b.free[i] / b.mu[i];
+        leading = leading && !any<Real>(b.free[i] > none);
+        if (leading) b.first = i + 1;
+        else if (any<Real>(b.free[i] < one)) b.held_inside = true;
+        if (i > 0 && i < b.P - 1) b.dl[i] = Real(0.5) * (b.l[i - 1] + b.l[i]);
+    }
+}
+
+/// Reads the rest shape of a block of strands.
+template <class Real> void read(Block<Real> &b, const RestShape &rest, const BlockIndex<Real> &index) {
+    const int P = b.P;
+    const auto &strand = index.strand;
+    gather(b.anchor, rest.points.data(), P, strand);
+    gather<Real>(b.l, rest.length.data(), P - 1, P - 1, strand);
+    gather<Real>(b.mu, rest.mass.data(), P, P, strand);
+    gather<Real>(b.offset, rest.offset.data(), P, P, strand);
+    gather<Real>(b.kappa_r + 1, rest.curvature.data(), P - 2, P - 2, strand);
+    gather<Real>(b.tau_r + 2, rest.torsion.data(), P - 4, P - 4, strand);
+    gather<Real>(b.rho + 1, rest.ratio.data(), P - 3, P - 3, strand);
+    gather<Real>(b.G + 1, rest.weight.data(), P - 3, P - 3, strand);
+    gather<Real>(b.C + 1, rest.dihedral.data(), P - 3, P - 3, strand);
+    gather<Real>(&b.k_kappa, rest.bending.data(), 1, 1, strand);
+    gather<Real>(&b.k_tau, rest.twisting.data(), 1, 1, strand);
+    for (int i = 1; i < P - 2; ++i)
+        for (int lane = 0; lane < kLanes<Real>; ++lane) {
+            Real phi = b.C[i][lane];
+            b.C[i][lane] = std::cos(phi), b.S[i][lane] = std::sin(phi);
+        }
+    derive(b, rest, strand);
+}
+
+} // namespace ringlet

@@ -1,0 +1,157 @@
+// Contact of strands with the head: rows in the solve, then pushes and Coulomb friction between length steps.
+//
+// Source: contact.md section 1 (the recommended scheme), steps a to d2. Notation: phi signed distance at the head's new
+// pose, h contact offset of the point, n world normal, g = phi - h gap, N contact force over the mean mass [m/s^2],
+// s displacement that the contact force is worth [m], a 1 where the contact holds.
+#pragma once
+
+#include "block.hpp"
+#include "distance_field.hpp"
+#include "pose.hpp"
+
+namespace ringlet {
+
+inline constexpr double kRow = 1e3;         // stiffness of a row, in m / dt^2
+inline constexpr double kKeepGap = 0.2e-3;  // [m] a contact that pushed keeps its row up to this gap
+inline constexpr double kKeepWeight = 0.2;  // and closes this part of the gap
+inline constexpr double kPull = 0.01;       // [m/s^2] a row that pulls more than this is dropped
+inline constexpr double kDepth = 0.05e-3;   // [m] depth below the offset that is let pass
+
+/// The head during one step.
+template <class Real> struct HeadStep {
+    const DistanceField *field; // null for no head
+    Rigid<Real> local, turn;    // world -> rest frame at the new pose; rest frame -> world
+    Rigid<Real> carry;          // world -> world: what moves with the head from the old pose to the new one
+
+    HeadStep(const DistanceField *field, const Pose &before, const Pose &after)
+        : field(field), local(after.inverse()), turn(after), carry(after * before.inverse()) {}
+};
+
+template <class Real> struct Contacts {
+    using L = Lanes<Real>;
+    const L none = splat(Real(0)), one = splat(Real(1));
+    Vec3<Real> *n, *nearby;    // normal of the contact; place of the last sample in the head's frame
+    L *phi;                    // distance there
+    L *row, *gap, *N;          // rows: 1 where one acts, g', contact force of the solve
+    L *a, *s, *fresh, *stuck;  // rounds: contact holds, worth, new part of s, held by friction
+    bool any_row = false;
+
+    Contacts(Arena &arena, int P) : n(arena.take<Vec3<Real>>(P)), nearby(arena.take<Vec3<Real>>(P)) {
+        for (auto **array : {&phi, &row, &gap, &N, &a, &s, &fresh, &stuck}) *array = arena.take<L>(P);
+    }
+
+    /// Forgets the samples: nothing is known to be far.
+    void forget(int P) {
+        for (int i = 0; i < P; ++i) phi[i] = splat(Real(-1e3)), nearby[i] = Vec3<Real>{};
+    }
+
+    /// Samples the field at point i; false when no lane can be within `reach` of the surface. A sample is spared when
+    /// the last one and the steepest slope of the field prove as much.
+    RINGLET_INLINE bool near(const HeadStep<Real> &head, int i, Vec3<Real> x, L reach, L &distance, Vec3<Real> &normal) {
+        const Vec3<Real> at = head.local(x), moved = at - nearby[i];
+        L bound = phi[i] - Real(head.field->steepest) * square_root<Real>(dot(moved, moved));
+        if (!any<Real>(~(bound > reach))) return false;
+        sample<Real>(*head.field, at, distance, normal);
+        nearby[i] = at, phi[i] = distance;
+        if (!any<Real>(distance < reach)) return false;
+        L steepness = square_root<Real>(dot(normal, normal) + Real(1e-20));
+        normal = head.turn.turn((1 / steepness) * normal);
+        return true;
+    }
+
+    /// Step a: which points get a row, from their predicted positions.
+    void find_rows(const Block<Real> &b, const HeadStep<Real> &head, const Motion<Real> &from, Real dt) {
+        any_row = false;
+        for (int i = 0; i < b.P; ++i) {
+            row[i] = none, a[i] = none, s[i] = none, fresh[i] = none, stuck[i] = none, N[i] = none;
+            if (!head.field || i < b.first) continue;
+            L distance;
+            Vec3<Real> normal;
+            const L reach = b.offset[i] + Real(kKeepGap);
+            if (!near(head, i, from.x[i] + splat(dt) * from.v[i], reach, distance, normal)) continue;
+            L g = distance - b.offset[i];
+            Mask<Real> on = (b.free[i] > none) & ((g < none) | ((from.touch[i] > none) & (g < Real(kKeepGap))));
+            row[i] = select<Real>(on, one, none);
+            gap[i] = select<Real>(g > none, Real(kKeepWeight) * g, g);
+            n[i] = select(on, normal, n[i]);
+            any_row = any_row || any<Real>(on);
+        }
+    }
+
+    /// Step b: contact forces of the solution u; drops rows that pull. True when one was dropped.
+    bool release(const Block<Real> &b, const Motion<Real> &from, const Vec3<Real> *u, Real dt) {
+        bool dropped = false;
+        const Real k = Real(kRow) / (dt * dt);
+        for (int i = b.first; i < b.P; ++i) {
+            N[i] = row[i] * (-k) * (gap[i] + dt * dot(n[i], u[i] - from.v[i]));
+            Mask<Real> pulls = N[i] < Real(-kPull);
+            dropped = dropped || any<Real>(pulls);
+            row[i] = select<Real>(pulls, none, row[i]);
+        }
+        return dropped;
+    }
+
+    /// Step c: what the forces of the rows are worth as displacements.
+    void begin_rounds(const Block<Real> &b, Motion<Real> &to, Real theta_dt2) {
+        for (int i = b.first; i < b.P; ++i) {
+            N[i] = row[i] * maximum<Real>(N[i], none);
+            a[i] = select<Real>(N[i] > none, one, none);
+            s[i] = theta_dt2 * b.w[i] * N[i];
+            fresh[i] = s[i];
+            to.touch[i] = a[i];
+        }
+    }
+
+    /// Steps d1 and d2 for the lanes that are busy: pushes points out, then friction against the head's motion with
+    /// the new part of s as budget. Returns the depth of each lane before the push.
+    L push(const Block<Real> &b, const HeadStep<Real> &head, const Vec3<Real> *old, Real friction, Mask<Real> busy,
+           Motion<Real> &to) {
+        L deepest = none;
+        if (!head.field) return deepest;
+        for (int i = b.first; i < b.P; ++i) {
+            L distance;
+            Vec3<Real> normal;
+            const L reach = b.offset[i] + Real(kKeepGap);
+            if (!near(head, i, to.x[i], reach, distance, normal)) continue;
+            Mask<Real> here = busy & (b.free[i] > none) & (distance < reach);
+            n[i] = select(here, normal, n[i]);
+            L depth = select<Real>(here, maximum<Real>(b.offset[i] - distance, none), none);
+            deepest = maximum<Real>(deepest, depth);
+            if (!any<Real>((depth + fresh[i]) > none)) continue;
+            to.x[i] = to.x[i] + depth * n[i];
+            a[i] = select<Real>(depth > none, one, a[i]);
+            to.touch[i] = select<Real>(depth > none, one, to.touch[i]);
+            s[i] += depth;
+            rub(head, i, old[i], friction, depth, here, to);
+        }
+        return deepest;
+    }
+
+    /// Step d2 at point i: takes the sliding back as far as the budget mu (new part of s) goes.
+    RINGLET_INLINE void rub(const HeadStep<Real> &head, int i, Vec3<Real> old, Real friction, L depth, Mask<Real> here,
+                            Motion<Real> &to) {
+        L budget = select<Real>(here, friction * (depth + fresh[i]), none);
+        fresh[i] = select<Real>(here, none, fresh[i]);
+        Vec3<Real> moved = to.x[i] - head.carry(old), slid = moved - dot(moved, n[i]) * n[i];
+        L length = square_root<Real>(dot(slid, slid) + Real(1e-30));
+        Mask<Real> holds = (budget >= length) & (budget > none);
+        L part = select<Real>(holds, one, budget / length);
+        to.x[i] = to.x[i] - part * slid;
+        stuck[i] = select<Real>(holds, one, stuck[i]);
+    }
+
+    /// Step e: velocity of a point that touches: across the surface the head's, along it the head's where stuck.
+    RINGLET_INLINE Vec3<Real> velocity(const HeadStep<Real> &head, int i, Vec3<Real> old, Vec3<Real> now,
+                                       Vec3<Real> v_free, Real dt) const {
+        Mask<Real> on = (a[i] > none) | (row[i] > none);
+        if (!any<Real>(on)) return v_free;
+        const L per_second = splat(1 / dt);
+        Vec3<Real> carried = head.carry(old), v_head = per_second * (carried - old);
+        Vec3<Real> moved = now - carried, slid = moved - dot(moved, n[i]) * n[i];
+        Vec3<Real> relative = v_free - v_head, sliding = relative - dot(relative, n[i]) * n[i];
+        Vec3<Real> along = select(stuck[i] > none, per_second * slid, sliding);
+        return select(on, v_head + along, v_free);
+    }
+};
+
+} // namespace ringlet

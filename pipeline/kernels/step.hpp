@@ -1,0 +1,198 @@
+// One time step of a block of strands: solve, contact and length relaxation in rounds, velocities; halved on failure.
+//
+// Source: physics.md section 3, contact.md section 1. A lane that has converged is left alone while others go on, and
+// a halved step is taken over only by the lanes that needed it: the motion of a strand does not depend on the strands
+// beside it (test_a_strand_moves_the_same_alone_and_among_others).
+#pragma once
+
+#include "implicit.hpp"
+#include "relaxation.hpp"
+
+#include <memory>
+#include <vector>
+
+namespace ringlet {
+
+inline constexpr int kHalvings = 6, kResolves = 2;
+
+/// What happened, added up over the steps of a block. Per lane where lanes differ.
+template <class Real> struct Tally {
+    Lanes<Real> strain{}, depth{};
+    long rounds = 0, solves = 0, halvings = 0, steps = 0;
+    int rounds_max = 0;
+    double contacts = 0;
+};
+
+/// Steps one block. All memory comes from the arena, once.
+template <class Real> class Stepper {
+    using L = Lanes<Real>;
+    using M = Mask<Real>;
+
+  public:
+    Block<Real> block;
+    Motion<Real> now;
+    Contacts<Real> contacts;
+    Tally<Real> tally;
+
+    Stepper(Arena &arena, int P, const StepSettings &settings, const DistanceField *field)
+        : block(arena, P), now(arena, P), contacts(arena, P), settings_(settings), field_(field), next_(arena, P),
+          edges_(arena, P), lengths_(arena, P), narrow_(arena, P), wide_(arena, wide(settings) ? P : 0),
+          f_(arena.take<Vec3<Real>>(P)), u_(arena.take<Vec3<Real>>(P)), star_(arena.take<Vec3<Real>>(P)) {
+        for (int depth = 0; depth < 2 * kHalvings; ++depth) halves_.emplace_back(arena, P);
+    }
+
+    /// Bytes that a Stepper takes from its arena.
+    static size_t bytes(int P) {
+        constexpr size_t bands = 12 + 15 + 2, motions = 2 + 2 * kHalvings, points = 64;
+        return sizeof(L) * (bands * 3 * (P + 16) + (8 * motions + points) * P + 4096);
+    }
+
+    void step(const Interval<Real> &interval, M wanted) {
+        ++tally.steps;
+        advance(interval, now, next_, wanted, 0);
+        std::swap(now, next_);
+        if (!field_) return;
+        for (int i = block.first; i < block.P; ++i) {
+            L touching = select<Real>(wanted, now.touch[i], L{});
+            if (!any<Real>(touching > 0)) continue;
+            for (int lane = 0; lane < kLanes<Real>; ++lane) tally.contacts += touching[lane];
+        }
+    }
+
+  private:
+    static bool wide(const StepSettings &settings) { return settings.torsion == Torsion::frenet; }
+
+    const StepSettings &settings_;
+    const DistanceField *field_;
+    Motion<Real> next_;
+    std::vector<Motion<Real>> halves_;
+    Edges<Real> edges_;
+    Lengths<Real> lengths_;
+    Banded<Real, 12> narrow_;
+    Banded<Real, 15> wide_;
+    Vec3<Real> *f_, *u_, *star_; // forces, velocities of travel, points before the rounds
+
+    /// One step, or two half steps for the lanes in which it fails (contact.md step f).
+    void advance(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to, M wanted, int depth) {
+        const Tally<Real> before = tally;
+        M failed = attempt(interval, from, to, wanted) & wanted;
+        if (!any<Real>(failed) || depth == kHalvings) return;
+        keep_accepted(before, failed);
+        Motion<Real> &middle = halves_[2 * depth], &end = halves_[2 * depth + 1];
+        advance(interval.halved(false), from, middle, failed, depth + 1);
+        advance(interval.halved(true), middle, end, failed, depth + 1);
+        for (int i = 0; i < block.P; ++i) {
+            to.x[i] = select(failed, end.x[i], to.x[i]);
+            to.v[i] = select(failed, end.v[i], to.v[i]);
+            to.T[i] = select<Real>(failed, end.T[i], to.T[i]);
+            to.touch[i] = select<Real>(failed, end.touch[i], to.touch[i]);
+        }
+    }
+
+    /// A failed attempt is not a step's end: its strain and depth do not count.
+    void keep_accepted(const Tally<Real> &before, M failed) {
+        ++tally.halvings;
+        tally.strain = select<Real>(failed, before.strain, tally.strain);
+        tally.depth = select<Real>(failed, before.depth, tally.depth);
+    }
+
+    /// The whole step from one motion to another; the lanes in which lengths and contacts did not converge.
+    M attempt(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to, M wanted) {
+        const Real dt = Real(interval.dt);
+        const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
+        move_held(interval, from, to);
+        edges_.set(from.x, block.P);
+        internal_forces(block, settings_, from.T, edges_, f_);
+        contacts.find_rows(block, head, from, dt);
+        if (settings_.is_explicit) explicit_velocities(interval, from, to);
+        else implicit_velocities(interval, from, to);
+        for (int i = block.first; i < block.P; ++i) {
+            star_[i] = select(block.free[i] > 0, from.x[i] + splat(dt) * u_[i], to.x[i]);
+            to.x[i] = star_[i];
+        }
+        M failed = relax(head, from, to, theta() * dt * dt, wanted);
+        finish(head, from, to, dt);
+        return failed;
+    }
+
+    Real theta() const { return settings_.is_explicit ? Real(1) : Real(settings_.theta); }
+
+    /// Held points go with the head or the hand.
+    void move_held(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
+        const Rigid<Real> head(interval.poses.head[1]), hand(interval.poses.hand[1]);
+        const L per_second = splat(Real(1) / Real(interval.dt));
+        for (int i = 0; i < block.P; ++i) {
+            if (i >= block.first && !block.held_inside) break;
+            to.x[i] = select(block.hand[i] > 0, hand(block.anchor[i]), head(block.anchor[i]));
+            u_[i] = per_second * (to.x[i] - from.x[i]);
+        }
+    }
+
+    /// Banded solve; rows that would pull are dropped and the system is solved again.
+    void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
+        for (int again = 0;; ++again) {
+            ++tally.solves;
+            if (wide(settings_)) solve_velocities(block, from, interval, settings_, contacts, edges_, f_, wide_, u_, to.T);
+            else solve_velocities(block, from, interval, settings_, contacts, edges_, f_, narrow_, u_, to.T);
+            if (!contacts.any_row || !contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) return;
+        }
+    }
+
+    /// Symplectic Euler: no matrix, no tension, no rows; lengths and contacts are left to the rounds.
+    void explicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
+        const L dt = splat(Real(interval.dt));
+        for (int i = block.first; i < block.P; ++i) {
+            Drag<Real> drag(block, from, i, settings_, interval.wind);
+            Vec3<Real> v = from.v[i], slowing = drag.c_perp * v + ((drag.c_par - drag.c_perp) * dot(v, drag.t)) * drag.t;
+            Vec3<Real> a = (1 / block.mu[i]) * f_[i] + interval.gravity + drag.push - slowing;
+            u_[i] = select(block.free[i] > 0, v + dt * a, u_[i]);
+            contacts.row[i] = L{};
+        }
+        for (int j = 0; j < block.P; ++j) to.T[j] = from.T[j];
+    }
+
+    /// Step d: push, friction, lengths, until strain and depth are both small on the same points.
+    M relax(const HeadStep<Real> &head, const Motion<Real> &from, Motion<Real> &to, Real theta_dt2, M wanted) {
+        const bool newton = settings_.relaxation == Relaxation::newton;
+        const int most = newton ? kNewtonRounds : kSweepRounds;
+        contacts.begin_rounds(block, to, theta_dt2);
+        lengths_.clear(block.P);
+        M busy = wanted;
+        L strain{}, depth{};
+        for (int round = 0;; ++round) {
+            depth = select<Real>(busy, contacts.push(block, head, from.x, Real(settings_.friction), busy, to), depth);
+            strain = select<Real>(busy, lengths_.strain(block, to.x), strain);
+            M stretched = strain > Real(settings_.tolerance);
+            busy = busy & (stretched | (depth > Real(kDepth)));
+            if (!any<Real>(busy) || round == most) {
+                tally.rounds += round;
+                tally.rounds_max = std::max(tally.rounds_max, round);
+                break;
+            }
+            if (newton) lengths_.newton(block, contacts, busy & stretched, to.x);
+            else lengths_.sweep(block, contacts, busy & stretched, to.x);
+        }
+        tally.strain = maximum<Real>(tally.strain, select<Real>(wanted, strain, L{}));
+        tally.depth = maximum<Real>(tally.depth, select<Real>(wanted, depth, L{}));
+        return busy;
+    }
+
+    /// Velocities from the positions (step e) and tensions from the multipliers (step g).
+    void finish(const HeadStep<Real> &head, const Motion<Real> &from, Motion<Real> &to, Real dt) {
+        const L per_theta = splat(1 / theta()), per_move = splat(1 / (dt * theta()));
+        if (!settings_.is_explicit)
+            for (int j = 0; j < block.P - 1; ++j)
+                to.T[j] -= block.m0 * lengths_.lambda[j] / (dt * dt * theta() * block.l[j]);
+        for (int i = 0; i < block.P; ++i) {
+            if (i < block.first) {
+                to.v[i] = u_[i];
+                continue;
+            }
+            Vec3<Real> v = from.v[i] + per_theta * (u_[i] - from.v[i]) + per_move * (to.x[i] - star_[i]);
+            if (field_) v = contacts.velocity(head, i, from.x[i], to.x[i], v, dt);
+            to.v[i] = select(block.free[i] > 0, v, u_[i]);
+        }
+    }
+};
+
+} // namespace ringlet

@@ -1,0 +1,82 @@
+"""From the config's material and air to what the kernels step with."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import kernels
+from pipeline.config.schema import Hair, Simulate
+
+_HEAD, _HAND = 1, 2
+
+# The drag of air on an isolated fibre of 80 um and 1300 kg/m^3, c = 11 + 15 |u| [1/s], fitted to a cylinder's
+# C_D = 1 + 10 Re^(-2/3); per mass it falls as 1 / (width density).
+_DRAG, _DRAG_SPEED, _FITTED_WIDTH, _FITTED_DENSITY = 11.0, 15.0, 80e-6, 1300.0
+
+
+def mass_per_length(hair: Hair) -> float:
+    """Mass of a round fibre per length, rho pi r^2 [kg/m]."""
+    return hair.density * np.pi * hair.radius**2
+
+
+def bending_stiffness(hair: Hair) -> float:
+    """E I = E pi r^4 / 4 [N m^2] of a round fibre."""
+    return hair.young_modulus * np.pi * hair.radius**4 / 4
+
+
+def twisting_stiffness(hair: Hair) -> float:
+    """G J = G pi r^4 / 2 [N m^2] of a round fibre."""
+    return hair.shear_modulus * np.pi * hair.radius**4 / 2
+
+
+def held_points(pins: NDArray[np.uint8], points: int) -> NDArray[np.uint8]:
+    """Who holds each point, (G, P) uint8: 0 nobody, 1 the head, 2 the hand; `pins` (G, 2) counts at root and tip."""
+    index = np.arange(points)
+    held = np.where(index < pins[:, :1], _HEAD, 0)
+    return np.where(index >= points - pins[:, 1:].astype(int), _HAND, held).astype(np.uint8)
+
+
+def rest_shape(
+    hair: Hair, points: NDArray[np.floating], pins: NDArray[np.uint8], offset: NDArray[np.floating]
+) -> kernels.RestShape:
+    """The groom as rest shape: points (G, P, 3) [m], pins (G, 2) held at root and tip, contact offset (G, P) [m].
+
+    Raises ValueError when points are not finite or a segment has no length.
+    """
+    count = len(points)
+    return kernels.rest_shape(
+        np.ascontiguousarray(points, np.float64),
+        np.full(count, mass_per_length(hair)),
+        np.full(count, bending_stiffness(hair)),
+        np.full(count, twisting_stiffness(hair)),
+        held_points(pins, points.shape[1]),
+        np.ascontiguousarray(offset, np.float64),
+    )
+
+
+def step_settings(simulate: Simulate) -> kernels.StepSettings:
+    """How to step, as the config says."""
+    settings = kernels.StepSettings()
+    settings.dt = 1 / (simulate.fps * simulate.substeps)
+    settings.theta = simulate.theta
+    settings.gravity = simulate.gravity
+    settings.damping = simulate.hair.damping
+    settings.torsion = simulate.torsion
+    settings.relaxation = simulate.relaxation
+    settings.tolerance = simulate.tolerance
+    settings.friction = simulate.hair.friction
+    settings.drag, settings.drag_speed = drag(simulate.hair, simulate.air.shielding)
+    return settings
+
+
+def settling(simulate: Simulate) -> kernels.StepSettings:
+    """The settings of the first half of the settling: full drag and theta = 1. What rests, rests with both."""
+    settings = step_settings(simulate)
+    settings.theta = 1.0
+    settings.drag, settings.drag_speed = drag(simulate.hair, 1.0)
+    return settings
+
+
+def drag(hair: Hair, shielding: float) -> tuple[float, float]:
+    """Constant [1/s] and linear part [1/m] of the drag rate across the strand; `shielding` 1 is an isolated fibre."""
+    scale = shielding * (_FITTED_WIDTH / (2 * hair.radius)) * (_FITTED_DENSITY / hair.density)
+    return _DRAG * scale, _DRAG_SPEED * scale

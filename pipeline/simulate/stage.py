@@ -1,0 +1,87 @@
+"""Stage 2, the guides in motion: reads groom.h5, writes guides.h5, goes on from the last checkpoint."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import cache, kernels
+from pipeline.config import Config, provenance
+from pipeline.progress import say, track
+from pipeline.simulate.plots import draw_energies
+from pipeline.simulate.stepper import Guides, Simulation, SimulationDiverged
+
+CHECKPOINT_FRAMES = 8
+
+
+def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
+    """Simulate the guides of groom.h5 and write guides.h5; a run that was killed goes on bit by bit.
+
+    Raises SimulationDiverged, Missing or Damaged (all InputErrors).
+    """
+    guides, strand = read_guides(experiment)
+    simulation = Simulation(config.simulate, config.seed, guides)
+    segments = cache.Segments(experiment.guides, key)
+    try:
+        _fill(segments, simulation)
+    except SimulationDiverged as error:
+        kept = experiment.folder / "diverged.h5"
+        _keep(simulation, kept, key)
+        detail = f" (strand {strand[error.guide]} of the groom; its state is in {kept})"
+        raise SimulationDiverged(error.guide, error.frame, detail) from error
+    segments.merge(provenance(config, "simulate"), config.simulate.fps)
+    with cache.open_guides(experiment.guides) as written:
+        draw_energies(experiment.folder / "energy.png", written.diagnostics, written.fps)
+
+
+def run(simulation: Simulation, start: int = 0) -> Iterator[cache.Frame]:
+    """Yield the frames from `start` on; the simulation stands at the frame before it, or at the first one."""
+    for index in range(start, simulation.simulate.frames):
+        if index > 0:
+            simulation.next_frame()
+        yield simulation.frame()
+
+
+def read_guides(experiment: cache.Experiment) -> tuple[Guides, NDArray[np.uint32]]:
+    """The guides of groom.h5 and the strands that they are, (G,) uint32."""
+    with cache.open(experiment.groom, kind="groom") as groom:
+        strand = groom["guides/strand"][:]
+        guides = Guides(
+            points=groom["strands/points"][strand],
+            pins=groom["strands/pins"][strand],
+            offset=groom["guides/offset"][:],
+            field=_distance_field(groom),
+        )
+    return guides, strand
+
+
+def _fill(segments: cache.Segments, simulation: Simulation) -> None:
+    done, saved = segments.resume()
+    if saved is not None:
+        simulation.restore(saved)
+        say("simulate", f"going on after frame {done}")
+    else:
+        with track("settle", simulation.settling_steps, "step") as bar:
+            simulation.settle(bar.advance)
+    frames: list[cache.Frame] = []
+    with track("simulate", simulation.simulate.frames - done) as bar:
+        for index, frame in enumerate(run(simulation, done), start=done + 1):
+            frames.append(frame)
+            bar.advance()
+            if len(frames) == CHECKPOINT_FRAMES or index == simulation.simulate.frames:
+                segments.append(frames, simulation.save())
+                frames = []
+
+
+def _keep(simulation: Simulation, path: Path, key: str) -> None:
+    with cache.create(path, kind="state", key=key) as writer:
+        for name, array in simulation.save().items():
+            writer.write(name, array)
+
+
+def _distance_field(groom: cache.Reader) -> kernels.DistanceField | None:
+    if "head/distance" not in groom:
+        return None
+    values, origin = groom["head/distance"][:], groom["head/origin"][:]
+    return kernels.DistanceField(values, origin, float(groom["head/spacing"][0]))

@@ -1,0 +1,151 @@
+"""The guides in motion: a state, the clock, and what moves them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import kernels
+from pipeline.cache import Frame
+from pipeline.config.schema import Simulate
+from pipeline.errors import InputError
+from pipeline.simulate.motion import head_motion, tip_motion
+from pipeline.simulate.rest import rest_shape, settling, step_settings
+from pipeline.simulate.wind import wind
+
+Arrays = dict[str, NDArray[Any]]
+
+_ENERGIES = ("bending", "torsion", "kinetic", "gravity")
+_BLOWN_UP = 2.0  # times its length away from its root
+
+
+class SimulationDiverged(InputError):
+    """A guide is no longer finite or has blown up."""
+
+    def __init__(self, guide: int, frame: int, detail: str = "") -> None:
+        self.guide, self.frame = guide, frame
+        when = f"before frame {frame}" if frame > 1 else "while settling"
+        super().__init__(
+            f"simulate: guide {guide}{detail} diverged {when}; raise simulate.substeps or simulate.theta"
+        )
+
+
+@dataclass(frozen=True)
+class Guides:
+    """What is simulated, in the head's rest pose."""
+
+    points: NDArray[np.float32]
+    """(G, P, 3) [m]: the groom, which is the rest shape."""
+    pins: NDArray[np.uint8]
+    """(G, 2): held points at root and tip."""
+    offset: NDArray[np.float32]
+    """(G, P) [m]: distance that points keep from the head."""
+    field: kernels.DistanceField | None = None
+    """Distance to the head; None without one."""
+
+
+class Simulation:
+    """Guides that are stepped from frame to frame.
+
+    Step 0 is the first frame; the settling has negative steps. Everything that moves the guides is a function of
+    the step, so `save` and `restore` carry on bit by bit.
+    """
+
+    def __init__(self, simulate: Simulate, seed: int, guides: Guides) -> None:
+        self.simulate = simulate
+        self.rest = rest_shape(simulate.hair, guides.points, guides.pins, guides.offset)
+        self.field = guides.field
+        self.settings = step_settings(simulate)
+        self.head = head_motion(simulate.motion)
+        self.hand = tip_motion(simulate.tips, _middle_of_tips(guides), simulate.settle / 2)
+        self.wind = wind(simulate.air, seed)
+        self.step = 0
+        self.state = kernels.at_rest(self._first_points(guides.points))
+        self._diagnostics = _summary(None)
+
+    def settle(self, report: Callable[[int], None] = lambda _: None) -> None:
+        """Let the guides come to rest with the head at its first pose; `report` hears of steps done."""
+        steps = self.settling_steps
+        damped = settling(self.simulate)
+        for first in range(-steps, 0, self.simulate.substeps):
+            self.step = first
+            count = min(self.simulate.substeps, -first)
+            self._advance(count, damped if first < -steps // 2 else self.settings)
+            report(count)
+        self.step = 0
+
+    @property
+    def settling_steps(self) -> int:
+        """Number of steps before the first frame."""
+        return round(self.simulate.settle / self.settings.dt)
+
+    def next_frame(self) -> None:
+        """Step to the next frame. Raises SimulationDiverged."""
+        self._advance(self.simulate.substeps, self.settings)
+
+    def frame(self) -> Frame:
+        """The frame at the present step: energies [J] of all guides, worst strain and penetration [m] on the way."""
+        energies = kernels.energies(self.state, self.rest, self.settings).sum(axis=0)
+        diagnostics = dict(zip(_ENERGIES, energies.tolist(), strict=True)) | self._diagnostics
+        return Frame(self.state.points.astype(np.float32), self.head(self._time(0)), diagnostics)
+
+    def save(self) -> Arrays:
+        """All that the future depends on."""
+        state = self.state
+        return {
+            "points": state.points,
+            "velocity": state.velocity,
+            "tension": state.tension,
+            "contact": state.contact,
+            "step": np.array([self.step], np.int64),
+        }
+
+    def restore(self, saved: Arrays) -> None:
+        """Carry on from what `save` returned."""
+        arrays = (np.ascontiguousarray(saved[name]) for name in ("points", "velocity", "tension", "contact"))
+        self.state = kernels.State(*arrays)
+        self.step = int(saved["step"][0])
+
+    def _advance(self, count: int, settings: kernels.StepSettings) -> None:
+        heads = [self.head(self._time(i)) for i in range(count + 1)]
+        hands = [head @ self.hand(self._time(i)) for i, head in enumerate(heads)]
+        winds = [self.wind(self._time(i + 0.5)) for i in range(count)]
+        drive = kernels.Drive(np.array(heads), np.array(winds), np.array(hands))
+        report = kernels.advance(self.state, self.rest, self.field, drive, settings)
+        self.step += count
+        self._diagnostics = _summary(report)
+        self.check()
+
+    def check(self) -> None:
+        """Raise SimulationDiverged when a guide is not finite or reaches further than twice its length."""
+        reach = np.linalg.norm(self.state.points - self.state.points[:, :1], axis=2).max(axis=1)
+        diverged = ~(reach < _BLOWN_UP * self.rest.length.sum(axis=1))  # nan compares false
+        if diverged.any():
+            raise SimulationDiverged(int(np.argmax(diverged)), 1 - (-self.step // self.simulate.substeps))
+
+    def _time(self, steps: float) -> float:
+        return (self.step + steps) * self.settings.dt
+
+    def _first_points(self, points: NDArray[np.float32]) -> NDArray[np.float32] | NDArray[np.float64]:
+        pose = self.head(0.0)
+        moved = points.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
+        return np.ascontiguousarray(moved, np.dtype(self.simulate.precision))
+
+
+def _summary(report: kernels.Report | None) -> dict[str, float]:
+    return {
+        "strain": report.strain if report else 0.0,
+        "penetration": report.depth if report else 0.0,
+        "relaxation": report.rounds if report else 0.0,
+        "contacts": report.contacts if report else 0.0,
+        "halvings": float(report.halvings) if report else 0.0,
+    }
+
+
+def _middle_of_tips(guides: Guides) -> NDArray[np.float64]:
+    held = guides.pins[:, 1] > 0
+    if not held.any():
+        return np.zeros(3)
+    return np.asarray(guides.points[held, -1].mean(axis=0, dtype=np.float64))

@@ -1,0 +1,222 @@
+"""The simulate stage: roots follow the head, results depend on nothing but the config, and runs resume exactly."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import cache, kernels
+from pipeline.bench.simulate import round_head
+from pipeline.config.schema import Config, Keyframe, Motion, Simulate
+from pipeline.simulate import stage
+from pipeline.simulate.motion import head_motion, place
+from pipeline.simulate.stepper import Guides, Simulation, SimulationDiverged
+
+GUIDES, POINTS = 37, 16
+SHAKE = Motion(preset="shake", period=0.4, amplitude=0.6, pivot=(0.0, -0.05, 0.0))
+SHORT = Simulate(frames=6, substeps=10, settle=0.2, motion=SHAKE, air={"gusts": 1.0})
+
+
+@pytest.fixture
+def guides() -> Guides:
+    return round_head(GUIDES, POINTS)
+
+
+def simulated(simulate: Simulate, guides: Guides) -> list[cache.Frame]:
+    simulation = Simulation(simulate, seed=3, guides=guides)
+    simulation.settle()
+    return list(stage.run(simulation))
+
+
+def bytes_of(frames: list[cache.Frame]) -> list[bytes]:
+    return [
+        frame.points.tobytes() + frame.pose.tobytes() + repr(frame.diagnostics).encode() for frame in frames
+    ]
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_a_resumed_run_is_bit_identical(guides: Guides, precision: str) -> None:
+    simulate = SHORT.model_copy(update={"precision": precision})
+    whole = Simulation(simulate, 3, guides)
+    whole.settle()
+    frames = []
+    for frame in stage.run(whole):
+        frames.append(frame)
+        if len(frames) == 3:
+            saved = {name: array.copy() for name, array in whole.save().items()}
+    resumed = Simulation(simulate, 3, guides)
+    resumed.restore(saved)
+    assert bytes_of(list(stage.run(resumed, start=3))) == bytes_of(frames[3:])
+
+
+def test_guides_do_not_depend_on_the_number_of_threads(guides: Guides) -> None:
+    results = []
+    for threads in (1, 2):
+        kernels.set_threads(threads)
+        results.append(bytes_of(simulated(SHORT, guides)))
+    kernels.set_threads(0)
+    assert results[0] == results[1]
+
+
+def test_roots_move_exactly_with_the_head(guides: Guides) -> None:
+    head = head_motion(SHAKE)
+    frames = simulated(SHORT.model_copy(update={"precision": "float64"}), guides)
+    errors = []
+    for index, frame in enumerate(frames):
+        pose = head(index / SHORT.fps)
+        assert np.array_equal(frame.pose, pose)
+        errors.append(np.abs(frame.points[:, :2] - place(pose, guides.points[:, :2])).max())
+    moved = np.abs(frames[-1].pose - np.eye(4)).max()
+    print(f"roots off by {max(errors):.1e} m, head turned by {moved:.2f}")
+    assert max(errors) < 1e-7  # the float32 of the result
+    assert moved > 0.1
+
+
+def test_guides_stay_outside_the_head_and_keep_their_length(guides: Guides) -> None:
+    frames = simulated(SHORT, guides)
+    penetration = max(frame.diagnostics["penetration"] for frame in frames)
+    strain = max(frame.diagnostics["strain"] for frame in frames)
+    contacts = max(frame.diagnostics["contacts"] for frame in frames)
+    print(f"penetration {penetration * 1e3:.4f} mm, strain {strain:.1e}, {contacts:.0f} contacts")
+    assert penetration <= 0.06e-3
+    assert strain <= 2e-4
+    assert contacts > 0
+
+
+def test_float32_and_float64_agree(guides: Guides) -> None:
+    results = [
+        simulated(SHORT.model_copy(update={"precision": precision}), guides)[-1].points
+        for precision in ("float32", "float64")
+    ]
+    difference = np.linalg.norm(results[0] - results[1], axis=2)
+    print(f"float32 against float64: median {np.median(difference):.1e} m, largest {difference.max():.1e} m")
+    assert np.median(difference) < 1e-4
+
+
+def test_hair_at_rest_stays_at_rest(guides: Guides) -> None:
+    frames = simulated(Simulate(frames=2, settle=4.0), guides)
+    moved = np.abs(frames[1].points - frames[0].points).max()
+    print(
+        f"after 4 s of settling a frame moves {moved:.1e} m, kinetic {frames[1].diagnostics['kinetic']:.1e} J"
+    )
+    assert moved < 1e-4
+
+
+def swatch(count: int = 3) -> Guides:
+    points = np.zeros((count, POINTS, 3), np.float32)
+    points[..., 1] = -np.linspace(0, 0.2, POINTS)
+    points[..., 0] = 0.01 * np.arange(count)[:, None]
+    pins = np.tile(np.array([2, 2], np.uint8), (count, 1))
+    return Guides(points, pins, np.zeros((count, POINTS), np.float32))
+
+
+def test_pinned_tips_follow_their_keyframes_relative_to_the_head() -> None:
+    tips = (Keyframe(time=0.0), Keyframe(time=0.125, position=(0.0, 0.05, 0.01)))
+    head = Motion(keyframes=(Keyframe(time=0.0), Keyframe(time=0.125, position=(0.02, 0.0, 0.0))))
+    frames = simulated(Simulate(frames=5, settle=0.1, tips=tips, motion=head), swatch())
+    expected = swatch().points[:, -2:] + (0.02, 0.05, 0.01)
+    error = np.abs(frames[-1].points[:, -2:] - expected).max()
+    print(f"driven tips off by {error:.1e} m")
+    assert error < 1e-7
+
+
+def test_divergence_names_guide_and_frame(guides: Guides) -> None:
+    simulation = Simulation(SHORT, 3, guides)
+    simulation.state.points[5, 9] = np.nan
+    with pytest.raises(
+        SimulationDiverged, match=r"guide 5 diverged before frame 2; raise simulate\.substeps"
+    ):
+        simulation.next_frame()
+
+
+def test_strands_that_fly_apart_count_as_diverged(guides: Guides) -> None:
+    simulation = Simulation(SHORT, 3, guides)
+    simulation.settle()
+    simulation.state.points[7, 4:] += 50.0
+    with pytest.raises(SimulationDiverged, match="guide 7"):
+        simulation.check()
+
+
+# --- with files -----------------------------------------------------------------------------------
+
+CONFIG = Config(
+    name="test",
+    scene={"head": "none"},
+    groom={"source": "swatch"},
+    simulate={"frames": 20, "settle": 0.1, "air": {"gusts": 2.0}, "substeps": 4},
+)
+
+
+def experiment_with_groom(folder: Path, guides: Guides) -> cache.Experiment:
+    experiment = cache.Experiment(folder)
+    with cache.create(experiment.groom, kind="groom", key="groom") as writer:
+        writer.write("strands/points", guides.points)
+        writer.write("strands/pins", guides.pins)
+        writer.write("guides/strand", np.arange(len(guides.points), dtype=np.uint32))
+        writer.write("guides/offset", guides.offset)
+    return experiment
+
+
+def test_a_killed_run_goes_on_to_the_same_file(tmp_path: Path) -> None:
+    whole = experiment_with_groom(tmp_path / "whole", swatch())
+    killed = experiment_with_groom(tmp_path / "killed", swatch())
+    stage.execute(CONFIG, whole, "key")
+    program = f"""
+import os, signal
+from pathlib import Path
+from pipeline import cache
+from pipeline.config.schema import Config
+from pipeline.simulate import stage, stepper
+steps = []
+def next_frame(self, step=stepper.Simulation.next_frame):
+    steps.append(step(self))
+    if len(steps) == 13:
+        os.kill(os.getpid(), signal.SIGKILL)
+stepper.Simulation.next_frame = next_frame
+stage.execute(Config.model_validate_json({CONFIG.model_dump_json()!r}), cache.Experiment(Path({str(killed.folder)!r})), "key")
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, cwd=Path(__file__).parents[2]
+    )
+    assert ended.returncode == -signal.SIGKILL, ended.stderr.decode()
+    done, _ = cache.Segments(killed.guides, "key").resume()
+    print(f"killed after 13 frames, {done} of them kept")
+    assert done == stage.CHECKPOINT_FRAMES
+    assert not killed.guides.exists()
+    stage.execute(CONFIG, killed, "key")
+    with cache.open_guides(whole.guides) as one, cache.open_guides(killed.guides) as other:
+        assert one.frames == other.frames == 20
+        for index in range(one.frames):
+            assert np.array_equal(one.frame(index), other.frame(index))
+        assert all(np.array_equal(one.diagnostics[name], other.diagnostics[name]) for name in one.diagnostics)
+
+
+def test_a_diverged_run_keeps_its_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    experiment = experiment_with_groom(tmp_path, swatch())
+
+    def poisoned(self: Simulation, step=Simulation.next_frame) -> None:
+        self.state.points[1, 6] = np.nan
+        step(self)
+
+    monkeypatch.setattr(Simulation, "next_frame", poisoned)
+    with pytest.raises(
+        SimulationDiverged, match=r"guide 1 \(strand 1 of the groom; its state is in .*diverged\.h5"
+    ):
+        stage.execute(CONFIG, experiment, "key")
+    with cache.open(tmp_path / "diverged.h5", kind="state") as state:
+        assert not np.isfinite(state["points"][1]).all()
+    assert not experiment.guides.exists()
+
+
+def test_the_energy_plot_is_reproducible(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    pictures = []
+    for name in ("a", "b"):
+        experiment = experiment_with_groom(tmp_path / name, swatch())
+        stage.execute(CONFIG, experiment, "key")
+        pictures.append((experiment.folder / "energy.png").read_bytes())
+    assert pictures[0] == pictures[1]
+    assert pictures[0].startswith(b"\x89PNG")
