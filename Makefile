@@ -27,7 +27,7 @@ $(ENV): requirements.lock pyproject.toml .ci/environment
 	@PYTHON=$(PYTHON) .ci/environment $(VENV)
 	@touch $@
 
-$(KERNELS): $(KERNEL_SOURCES) | $(ENV)
+$(KERNELS): $(KERNEL_SOURCES) $(ENV)
 	@echo "building the kernels"
 	@$(BIN)/cmake -S pipeline/kernels -B build/kernels -G Ninja -DCMAKE_BUILD_TYPE=Release \
 	  -DPython_EXECUTABLE=$(abspath $(BIN)/python) -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) >build.log 2>&1 \
@@ -79,7 +79,7 @@ sheet: render ## the frames of CONFIG on one page
 
 # --- Checks --------------------------------------------------------------------------------------
 
-.PHONY: test lint validate images approve bench sanitize
+.PHONY: test lint validate images approve bench sanitize schema
 test: env ## all tests
 	$(BIN)/pytest
 
@@ -95,13 +95,16 @@ validate: env ## the physics against closed forms and measurements
 images: env ## golden images; differences go to an HTML page
 	$(BIN)/pytest tests/images
 
-approve: env ## take the present images as the golden ones
-	$(BIN)/python tests/images/approve.py
+approve: env ## take the new images as the golden ones: make approve WHY="the reason"
+	$(BIN)/python tests/images/approve.py "$(WHY)"
 
 bench: env ## the figures of the README
 	$(RINGLET) bench simulate
 	$(RINGLET) bench interpolate
 	$(RINGLET) bench render
+
+schema: env ## configs/schema.json, after a change of pipeline/config/schema.py
+	$(RINGLET) config --schema >configs/schema.json
 
 sanitize: env ## kernels under the address and undefined-behaviour sanitizers
 	tests/kernels/sanitize.sh

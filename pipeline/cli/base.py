@@ -1,5 +1,6 @@
 """What all commands share: the application, the options that recur, and JSON on standard output."""
 
+import importlib.metadata
 import json
 import sys
 from pathlib import Path
@@ -19,6 +20,7 @@ app = App(
     name="ringlet",
     help="Batch hair pipeline: config -> groom -> simulate -> interpolate -> render.",
     help_format="plaintext",
+    version=lambda: importlib.metadata.version("ringlet"),
     suppress_keyboard_interrupt=False,
 )
 

@@ -117,15 +117,15 @@ def _make(
     batch.make(stage, wanted if stage == "render" else None)
 
 
-def _frame_range(text: str, count: int) -> tuple[int, int] | None:
+def _frame_range(text: str, count: int) -> range | None:
     if not text:
         return None
     first, dash, last = text.partition("-")
     try:
-        wanted = int(first), int(last if dash else first)
+        wanted = range(int(first), int(last if dash else first) + 1)
     except ValueError:
         raise InputError(f'--frames {text}: expected a range such as "10-20" or a number') from None
-    if not 1 <= wanted[0] <= wanted[1] <= count:
+    if not wanted or wanted[0] < 1 or wanted[-1] > count:
         raise InputError(f"--frames {text}: expected a range within 1-{count}")
     return wanted
 

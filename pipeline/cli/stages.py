@@ -16,52 +16,45 @@ NEEDS = {
     "interpolate": ("groom",),
     "render": ("groom", "simulate", "interpolate"),
 }
-KINDS = {"groom": "groom", "simulate": cache.guides.KIND, "interpolate": "strands"}
+_KINDS = {"groom": "groom", "simulate": "guides", "interpolate": "strands"}
+_REASONS_SHOWN = 3
 
 
 @dataclass(frozen=True)
 class State:
-    """Whether a stage's output fits the config; if not, the reason in a sentence."""
+    """Whether a stage's output fits the config; if not, why; of the render, also which frames do not."""
 
     name: str
-    fresh: bool
-    reason: str
+    reason: str = "fresh"
+    frames: tuple[int, ...] = ()
 
-
-Frames = tuple[int, int] | None
+    @property
+    def fresh(self) -> bool:
+        return self.reason == "fresh"
 
 
 class Batch:
-    """The stages of one config in one folder."""
+    """The stages of one config in one folder. Frames are counted from 1."""
 
     def __init__(self, config: Config, experiment: cache.Experiment) -> None:
         self.config, self.experiment = config, experiment
         self.keys, self.inputs = stage_keys(config), stage_inputs(config)
+        self.all_frames = range(1, config.simulate.frames + 1)
 
     def states(self) -> list[State]:
         """Examine every stage, in order; every file is read whole and verified."""
         return [self.state(stage) for stage in STAGES]
 
-    def state(self, stage: str, frames: Frames = None) -> State:
-        """Examine one stage; of the render, all frames or those from one number to another."""
+    def state(self, stage: str, frames: range | None = None) -> State:
+        """Examine one stage; of the render, only some frames if they are given."""
         if stage == "render":
-            return self._frames_state(frames)
-        path = self.file(stage)
-        try:
-            with cache.open(path, KINDS[stage]) as reader:
-                if reader.key == self.keys[stage]:
-                    reader.verify()
-                    return State(stage, True, "fresh")
-                return State(stage, False, self._why(stage, reader.provenance.get("inputs", {})))
-        except cache.Missing:
-            return State(stage, False, "not made yet")
-        except cache.Damaged as error:
-            return State(stage, False, str(error))
+            return self._state_of_frames(frames or self.all_frames)
+        return State(stage, self._why_stale(stage) or "fresh")
 
-    def make(self, stage: str, frames: Frames = None, touch: bool = True) -> None:
+    def make(self, stage: str, frames: range | None = None, touch: bool = True) -> None:
         """Make one stage whose inputs are there, unless it is fresh.
 
-        What is fresh gets the current time, so that make, which compares times, does not ask again.
+        What is there gets the current time, so that make, which compares times, does not ask again.
         """
         state = self.state(stage, frames)
         if not state.fresh:
@@ -69,55 +62,61 @@ class Batch:
                 state = self.state(stage, frames)  # another process may just have made it
                 if not state.fresh:
                     say(stage, f"start ({state.reason})")
-                    self._execute(stage, frames)
-                    return
-        say(stage, "fresh")
+                    self.execute(stage, state.frames)
+        if state.fresh:
+            say(stage, "fresh")
         if touch:
             for path in self.outputs(stage, frames):
                 os.utime(path)
 
-    def file(self, stage: str) -> Path:
-        """Return the file that a stage leaves; the render leaves a folder."""
-        folder = self.experiment
-        files = {
-            "groom": folder.groom,
-            "simulate": folder.guides,
-            "interpolate": folder.strands,
-            "render": folder.frames,
-        }
-        return files[stage]
+    def execute(self, stage: str, frames: tuple[int, ...]) -> None:
+        """Run the code of a stage; of the render, for these frames."""
+        execute: Callable[..., None] = importlib.import_module(f"pipeline.{stage}.stage").execute
+        only = {"frames": frames} if stage == "render" else {}
+        execute(self.config, self.experiment, self.keys[stage], **only)
 
-    def outputs(self, stage: str, frames: Frames = None) -> list[Path]:
+    def file(self, stage: str) -> Path:
+        """Return the file that a stage before the render leaves."""
+        folder = self.experiment
+        return {"groom": folder.groom, "simulate": folder.guides, "interpolate": folder.strands}[stage]
+
+    def outputs(self, stage: str, frames: range | None = None) -> list[Path]:
         """List the files that a stage leaves."""
         if stage != "render":
             return [self.file(stage)]
-        first, last = frames or (1, self.config.simulate.frames)
-        return [self.experiment.frames / f"{number:04d}.png" for number in range(first, last + 1)]
+        return [self.experiment.frames / f"{number:04d}.png" for number in frames or self.all_frames]
 
-    def _execute(self, stage: str, frames: Frames) -> None:
-        execute: Callable[..., None] = importlib.import_module(f"pipeline.{stage}.stage").execute
-        if stage == "render" and frames is not None:
-            execute(self.config, self.experiment, self.keys[stage], frames=frames)
-        else:
-            execute(self.config, self.experiment, self.keys[stage])
+    def _why_stale(self, stage: str) -> str | None:
+        try:
+            with cache.open(self.file(stage), _KINDS[stage]) as reader:
+                if reader.key != self.keys[stage]:
+                    return self._difference(stage, reader.provenance)
+                reader.verify()
+                return None
+        except cache.Missing:
+            return "not made yet"
+        except cache.Damaged as error:
+            return str(error)
 
-    def _why(self, stage: str, before: dict[str, object]) -> str:
-        return "; ".join(explain(before, self.inputs[stage])) or "its key changed"
+    def _difference(self, stage: str, provenance: dict[str, dict[str, object]]) -> str:
+        return "; ".join(explain(provenance.get("inputs", {}), self.inputs[stage])) or "its key changed"
 
-    def _frames_state(self, frames: Frames) -> State:
-        paths = self.outputs("render", frames)
-        missing, others = 0, {}
-        for path in paths:
+    def _state_of_frames(self, frames: range) -> State:
+        """Examine frames one by one; tell the first few different reasons."""
+        missing: list[int] = []
+        stale: dict[int, str] = {}
+        for number, path in zip(frames, self.outputs("render", frames), strict=True):
             try:
-                key, record = cache.picture_record(path)
+                key, provenance = cache.picture_record(path)
                 if key != self.keys["render"]:
-                    others[self._why("render", record.get("inputs", {}))] = path
+                    stale[number] = self._difference("render", provenance)
             except cache.Missing:
-                missing += 1
+                missing.append(number)
             except cache.Damaged as error:
-                others[str(error)] = path
-        reasons = list(others)[:3]
+                stale[number] = str(error)
+        if not missing and not stale:
+            return State("render")
+        reasons = list(dict.fromkeys(stale.values()))[:_REASONS_SHOWN]
         if missing:
-            some = "none" if missing == len(paths) else f"{len(paths) - missing}"
-            reasons.append(f"{some} of {len(paths)} frames made yet")
-        return State("render", not reasons, "; ".join(reasons) or "fresh")
+            reasons.append(f"{len(missing)} of {len(frames)} frames not made yet")
+        return State("render", "; ".join(reasons), tuple(sorted([*missing, *stale])))

@@ -33,7 +33,8 @@ class Comparison:
     def as_json(self) -> dict[str, Any]:
         """Return a summary that JSON can hold."""
         pairs = [
-            {"name": pair.name, "metrics": asdict(pair.metrics) if pair.metrics else None} for pair in self.pairs
+            {"name": pair.name, "metrics": asdict(pair.metrics) if pair.metrics else None}
+            for pair in self.pairs
         ]
         return {"identical": self.identical, "pairs": pairs}
 

@@ -25,7 +25,9 @@ input{width:100%}
 """
 
 
-def write_page(path: Path, title: str, pairs: Sequence[Pair], notes: dict[str, list[str]] | None = None) -> None:
+def write_page(
+    path: Path, title: str, pairs: Sequence[Pair], notes: dict[str, list[str]] | None = None
+) -> None:
     """Write the page for the pairs that are not identical; `notes` are lines to print under a pair's name."""
     shown = [pair for pair in pairs if pair.metrics is None or not pair.metrics.identical]
     parts = [_section(pair, (notes or {}).get(pair.name, [])) for pair in shown]
@@ -51,7 +53,7 @@ def _section(pair: Pair, notes: list[str]) -> str:
     )
     swipe = (
         f'<figure><div class="swipe">{_image(reference)}{_image(picture)}</div>'
-        "<input type=\"range\" value=\"50\" oninput=\"this.previousElementSibling.style.setProperty('--at',"
+        '<input type="range" value="50" oninput="this.previousElementSibling.style.setProperty(\'--at\','
         "this.value+'%')\"><figcaption>swipe: reference left, new right</figcaption></figure>"
     )
     return (

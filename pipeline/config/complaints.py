@@ -14,6 +14,7 @@ from pipeline.config.tree import KeyPath, Tree
 
 _PHRASES = {
     "Input should be a valid integer": "expected an integer",
+    "Input should be an object": "expected a table",
     "Input should be a valid": "expected a",
     "Input should": "expected to",
     "Tuple should": "expected to",

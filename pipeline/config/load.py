@@ -2,6 +2,7 @@
 
 import difflib
 import json
+import os
 import re
 import tomllib
 from dataclasses import dataclass
@@ -72,9 +73,10 @@ def _read(path: Path, files: list[Path]) -> Tree:
     where = f"{lines['extends',]}: extends"
     if not isinstance(parent, str):
         raise InputError(f'{where}: expected the name of a config, such as "default.toml"')
-    if not (path.parent / parent).is_file():
-        raise InputError(f"{where}: no such file: {path.parent / parent}{_similar(path.parent / parent)}")
-    tree = _read(path.parent / parent, files)
+    parent = Path(os.path.normpath(path.parent / parent))
+    if not parent.is_file():
+        raise InputError(f"{where}: no such file: {parent}{_similar(parent)}")
+    tree = _read(parent, files)
     tree.update(own)
     return tree
 

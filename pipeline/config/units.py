@@ -5,6 +5,7 @@ Each alias below is an annotated float that pydantic validates and that the JSON
 
 import math
 import re
+from decimal import Decimal
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, WithJsonSchema
@@ -36,7 +37,8 @@ def parse_quantity(value: Any, units: dict[str, float]) -> float:
             raise ValueError(f'expected a number with a unit, such as "1 {next(iter(units))}"')
         if match[2] not in units:
             raise ValueError(f"unknown unit {match[2]!r}; use one of {', '.join(units)}")
-        value = float(match[1]) * units[match[2]]
+        # Decimal, so that "40 um" is 4e-5 to the last bit: equal values give equal keys.
+        value = float(Decimal(match[1]) * Decimal(repr(units[match[2]])))
     if not math.isfinite(value):
         raise ValueError("expected a finite number")
     return float(value)

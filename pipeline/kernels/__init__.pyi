@@ -232,3 +232,226 @@ def relax(
 
     Held points stay; the free ones move as little as their masses ask for, so that their momentum is conserved.
     """
+
+# --- expansion: strands from guides (expand.hpp) -----------------------------------------------------
+
+class BoundStrands:
+    """Strands and the guides that they follow; holds the arrays given (see `pipeline.strands.expand.Binding`)."""
+
+    def __init__(
+        self,
+        parent: NDArray[np.uint32],
+        root: NDArray[np.float32],
+        guide: NDArray[np.uint32],
+        weight: NDArray[np.float32],
+        key: NDArray[np.uint32],
+        scale: NDArray[np.float32],
+        phase: NDArray[np.float32],
+    ) -> None:
+        """(N,), (N, 3) [m], (N, k), (N, k), (N,), (N,), (N,) [rad], 1 <= k <= 8; raises ValueError."""
+
+class GuideMotion:
+    """How the guides' segments have turned since rest, seen from the head: their Bishop frames' rotations."""
+
+    def __init__(self, rest: NDArray[np.float32], points: NDArray[np.float32], pose: _F64) -> None:
+        """Rotations of G guides.
+
+        Args:
+            rest: (G, Q, 3) float32 [m], Q >= 3, in the head's rest frame.
+            points: (G, Q, 3) float32 [m], in the world.
+            pose: (4, 4) float64, head's rest frame -> world.
+
+        Raises:
+            ValueError: wrong shapes.
+
+        """
+
+    @property
+    def rotations(self) -> NDArray[np.float32]:
+        """(G, Q-1, 4) float32: unit quaternions (w, x, y, z), of continuous sign along a guide."""
+
+class ExpandStyle:
+    """Distance from the skin [m], clump (0 .. 1) and frizz [rad] of copies."""
+
+    skin: float
+    clump: float
+    frizz: float
+
+    def __init__(self, skin: float, clump: float, frizz: float) -> None: ...
+
+def expand(
+    rest: NDArray[np.float32],
+    strands: BoundStrands,
+    motion: GuideMotion,
+    field: DistanceField | None,
+    style: ExpandStyle,
+    begin: int,
+    out: NDArray[np.float32],
+) -> None:
+    """Writes the points of strands begin .. begin+n to out, (n, P, 3) float32 [m] in the world.
+
+    `rest` is the groom (S, P, 3) float32 [m], P >= 2. Tangent rotation: a segment turns by the weighted mean of
+    its guides' rotations at the same arc length. A strand depends on nothing but its own row of the binding.
+
+    Raises:
+        ValueError: shapes or indices that do not fit.
+
+    """
+
+# --- shading: density grid, sweeps, fibre shading (density, sweep, fibre, shade, surface .hpp) ------
+#
+# World space [m], float32. Lights are directional; `directions` are unit vectors from the scene to the light.
+
+_F32 = NDArray[np.float32]
+
+class DensityGrid:
+    """Drawn hair in voxels: one integer count for each light and one without direction.
+
+    Integers add in any order, so that the sums depend neither on threads nor on how strands are cut into chunks.
+    """
+
+    def __init__(
+        self, shape: tuple[int, int, int], origin: _F64, spacing: float, width: float, directions: _F32
+    ) -> None:
+        """An empty grid.
+
+        Args:
+            shape: voxels along x, y, z; each >= 4.
+            origin: (3,) float64 [m], outer corner of the first voxel.
+            spacing: [m], side of a voxel.
+            width: [m], a typical drawn width; the counts are multiples of spacing * width / 4096.
+            directions: (L, 3) float32, unit vectors towards the lights.
+
+        """
+
+    def add(self, points: _F32, widths: _F32) -> None:
+        """Adds strands: points (S, P, 3) float32 [m], widths (S, P) float32 [m]. Parts outside the grid are left out."""
+
+    def density(self) -> _F32:
+        """(L+1, nx, ny, nz) float32 [1/m]: projected width per volume; blurred by a Gaussian of 0.7 voxels.
+
+        Entry l < L counts length * width * |t x L_l|, the last one length * width. A line integral of entry l
+        towards its light is the mean number of fibres on the way.
+        """
+
+    shape: tuple[int, int, int]
+    origin: tuple[float, float, float]
+    spacing: float
+
+def optical_depth(density: _F32, spacing: float, directions: _F32) -> _F32:
+    """Line integrals of the density from every voxel's middle along a direction to the border of the grid.
+
+    Args:
+        density: (N, nx, ny, nz) float32 [1/m]; (1, nx, ny, nz) is shared by all directions.
+        spacing: [m].
+        directions: (N, 3) float32 unit vectors.
+
+    Returns:
+        (N, nx, ny, nz) float32, one for each direction.
+
+    """
+
+def body_density(
+    field: DistanceField, pose: _F64, shape: tuple[int, int, int], origin: _F64, spacing: float
+) -> _F32:
+    """(nx, ny, nz) float32 [1/m]: the head as an almost opaque solid, one voxel thinner than it is.
+
+    Args:
+        field: the head in its rest frame.
+        pose: (4, 4) float64, rest frame -> world.
+        shape: voxels of the grid.
+        origin: (3,) float64 [m], outer corner of the first voxel.
+        spacing: [m].
+
+    """
+
+def surroundings(hair: _F32, body: _F32, spacing: float, loss: _F32, directions: _F32) -> _F32:
+    """What a point sees of the sky, and which way is out of the hair, on a grid of half the resolution.
+
+    Args:
+        hair: (nx, ny, nz) float32 [1/m], density without direction; even extents.
+        body: (nx, ny, nz) float32 [1/m].
+        spacing: [m].
+        loss: (3,) float32, part of the light that one fibre takes away, for R, G, B.
+        directions: (D, 3) float32, evenly spread unit vectors.
+
+    Returns:
+        (nx/2, ny/2, nz/2, 8) float32: mean transmittance R, G, B, 0, outward normal x, y, z (not normalised), 0.
+
+    """
+
+class FibreTables:
+    """Scattering of one fibre, tabulated; see `pipeline.render.fibre`."""
+
+    def __init__(self, lobes: _F32, sums: _F32, variance: _F32, tilt: _F32, absorption_max: float) -> None:
+        """The tables, held and not copied.
+
+        Args:
+            lobes: (A, T, H, 8) float32 over absorption (uniform in its root), theta_d in [0, pi/2], phi in [0, pi]:
+                N_R, N_TT, N_TRT, N_rest [1/rad], their means over a half circle G_R, G_TT, G_TRT + G_rest, 0.
+            sums: (A, T, 8) float32: a_f, a_b, mean of N over the circle for R, TT, TRT + rest, v_f, v_b, 0.
+            variance: (4,) float32, v of the four lobes.
+            tilt: (4,) float32 [rad], shift of theta_o in the four lobes.
+            absorption_max: [1/radius], absorption at the last level.
+
+        """
+
+class Illumination:
+    """Lights and sky, and what of them reaches each voxel."""
+
+    def __init__(
+        self, directions: _F32, irradiance: _F32, sky: _F32, depths: tuple[_F32, _F32, _F32], surroundings: _F32
+    ) -> None:
+        """Held and not copied.
+
+        Args:
+            directions: (L, 3) float32 unit vectors towards the lights.
+            irradiance: (L, 3) float32 [W/m^2], R, G, B on a surface that faces the light.
+            sky: (3,) float32, radiance of the constant sky.
+            depths: each (L, nx, ny, nz) float32: fibres towards the light, fibres away from it, body towards it.
+            surroundings: (nx/2, ny/2, nz/2, 8) float32, see `surroundings`.
+
+        """
+
+    origin: tuple[float, float, float]  # (0, 0, 0) [m]: outer corner of the first voxel
+    spacing: float  # 1 m
+    glints: bool  # True: sampled visibility per strand and 4 mm instead of its mean
+
+def shade(
+    points: _F32, absorption: _F32, key: NDArray[np.uint32], eye: _F64, light: Illumination, tables: FibreTables
+) -> _F32:
+    """Radiance of strands towards the eye.
+
+    Args:
+        points: (S, P, 3) float32 [m], root first.
+        absorption: (S, 3) float32 [1/radius], sigma_a for R, G, B.
+        key: (S,) uint32, random key of each strand.
+        eye: (3,) float64 [m].
+        light: lights and sky.
+        tables: scattering of one fibre.
+
+    Returns:
+        (S, P, 3) float32, linear R, G, B.
+
+    """
+
+class Surface:
+    """Points of the head's surface."""
+
+    def __init__(self, points: _F32, normals: _F32, albedo: _F32) -> None:
+        """Three arrays (N, 3) float32: world positions [m], unit outward normals, linear R, G, B in [0, 1]."""
+
+def shade_surface(
+    surface: Surface, eye: _F64, light: Illumination, field: DistanceField | None, pose: _F64, loss: _F32
+) -> _F32:
+    """Radiance (N, 3) float32 of the head towards the eye (3,): Lambert and a soft sheen, in the shadow of hair and head.
+
+    Args:
+        surface: what is lit.
+        eye: (3,) float64 [m].
+        light: lights and sky.
+        field: the head that casts its own shadow, in its rest frame.
+        pose: (4, 4) float64, rest frame -> world.
+        loss: (3,) float32, part of the light that one fibre takes away, for R, G, B.
+
+    """

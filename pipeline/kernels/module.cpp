@@ -26,6 +26,7 @@ static void set_threads(int count) {
 }
 
 void bind_energy(nb::module_ &m);
+void bind_expand(nb::module_ &m);
 void bind_step(nb::module_ &m);
 
 } // namespace ringlet
@@ -36,5 +37,6 @@ NB_MODULE(RINGLET_MODULE, m) {
           "Threads of every kernel from now on; 0 is all processors. No result depends on it.");
     m.def("threads", &ringlet::threads, "Threads that kernels use.");
     ringlet::bind_energy(m);
+    ringlet::bind_expand(m);
     ringlet::bind_step(m);
 }

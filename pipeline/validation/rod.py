@@ -124,6 +124,15 @@ class Rod:
         return float(kernels.energies(self.state, self.rest, self.settings).sum())
 
 
+def first_crossing(trace: Array) -> float:
+    """Steps until a positive signal crosses 0, by linear interpolation; nan when it never does."""
+    below = np.flatnonzero(trace < 0)
+    if len(below) == 0:
+        return float("nan")
+    before = int(below[0]) - 1
+    return float(before + trace[before] / (trace[before] - trace[before + 1]))
+
+
 def period(trace: Array, dt: float) -> float:
     """Mean period [s] of an oscillation about 0, from the first to the last upward crossing; nan without two."""
     before = np.flatnonzero((trace[:-1] < 0) & (trace[1:] >= 0))

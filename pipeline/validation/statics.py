@@ -42,7 +42,7 @@ def cantilever(gamma: float, model: Model = "none", points: int = 64) -> float:
 def tip_load(load: float, points: int = 64) -> float:
     """Tip drop over length of a strand with a weight P at its tip, P L^2/B = load; the strand itself weighs little."""
     length = 0.1
-    rod = Rod(straight(length, points), clamped(points), settling())
+    rod = Rod(straight(length, points), clamped(points), settling(dt=1e-3))
     mass = load * BENDING / length**2 / GRAVITY
     masses = np.full(points, 1e-5 * mass)
     masses[-1] = mass
@@ -107,13 +107,20 @@ def drift_of_helix(model: Model, points: int = 64) -> float:
     return float(np.abs(rod.state.points - curl).max() / 0.2)
 
 
-def static_spread(model: Model, points: int = 32) -> float:
-    """Largest distance between the tips of a hanging curl at rest, over its length, for dt from 0.5 to 16 ms."""
-    tips = []
-    for dt in (0.5e-3, 2e-3, 4e-3, 16e-3):
-        rod = Rod(helix(0.01, 0.03, 0.2, points), clamped(points), settling(model, dt))
-        tips.append(rod.to_rest(still=1e-10)[0, -1].copy())
-    return float(np.abs(np.array(tips) - tips[0]).max() / 0.2)
+def static_drift(model: Model, points: int = 32) -> float:
+    """How far the tip of a hanging curl leaves its place of rest, over its length, when dt goes from 4 ms to others.
+
+    All start from one equilibrium: a curl has several, and "frenet" may fall into another one on another way.
+    """
+    length = 0.2
+    rod = Rod(helix(0.01, 0.03, length, points), clamped(points), settling(model, 4e-3))
+    tip = rod.to_rest(still=1e-10)[0, -1].copy()
+    drifts = []
+    for dt in (0.5e-3, 2e-3, 16e-3):
+        rod.settings = settling(model, dt)
+        rod.advance(round(2.0 / dt))
+        drifts.append(np.abs(rod.state.points[0, -1] - tip).max() / length)
+    return float(max(drifts))
 
 
 def cases() -> list[Case]:
@@ -142,7 +149,7 @@ def cases() -> list[Case]:
             for model in MODELS
         ],
         *[
-            Case("static shape against time step", model, partial(static_spread, model), 0.0, 1e-6)
+            Case("static shape against time step", model, partial(static_drift, model), 0.0, 1e-6)
             for model in TORSION
         ],
     ]

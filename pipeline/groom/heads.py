@@ -1,0 +1,127 @@
+"""The head that hair grows on: the built-in mannequin or a mesh, with one scalp chart for both.
+
+A mesh's skull is fitted to the mannequin's by crown, breadth and depth (one scale, one offset); the mannequin's
+hairline, parting and cut heights then hold on it. Grooming happens in these fitted coordinates.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.config.schema import Config
+from pipeline.groom.head import scalp
+from pipeline.groom.head_field import Field
+
+Points = NDArray[np.floating[Any]]
+Feet = Callable[[Points], tuple[Points, Points]]
+
+# The mannequin's skull [m]: what a mesh is fitted to.
+_CROWN, _BREADTH, _OCCIPUT, _TOP = 0.131, 0.158, -0.0876, 0.075
+
+
+@dataclass(frozen=True)
+class Skin:
+    """A closed triangle mesh with normals and colours."""
+
+    points: NDArray[np.float32]
+    """(V, 3) [m]"""
+    triangles: NDArray[np.int32]
+    """(T, 3), counter-clockwise seen from outside."""
+    normals: NDArray[np.float32]
+    """(V, 3), unit, outwards."""
+    albedo: NDArray[np.float32]
+    """(V, 3) linear RGB."""
+
+
+@dataclass(frozen=True)
+class Head:
+    """A head in world coordinates, and where the mannequin's coordinates lie in it."""
+
+    skin: Skin
+    field: Field
+    """Distance to the skin, world."""
+    scale: float
+    """World metres per fitted metre."""
+    offset: NDArray[np.float64]
+    """World position of the fitted origin [m]."""
+    project: Feet
+    """Pulls points (N, 3) near the skin onto it and tells the normals there; fitted coordinates."""
+
+    @property
+    def fitted_field(self) -> Field:
+        """Distance to the skin in fitted coordinates."""
+        return self.field.rescaled(self.scale, self.offset)
+
+    def density(self, p: Points) -> Points:
+        """Relative density of roots at fitted points on the skin."""
+        return scalp.density(p)
+
+    def to_world(self, p: Points) -> Points:
+        """Fitted coordinates to world coordinates."""
+        return np.asarray(p * self.scale + self.offset)
+
+
+def make_head(config: Config) -> Head | None:
+    """The head of a config; None for "none". Raises InputError for a mesh that cannot serve."""
+    if config.scene.head == "none":
+        return None
+    if config.scene.head == "builtin":
+        return _mannequin(config.simulate.contact.spacing, config.scene.skin)
+    return _from_mesh(config)
+
+
+def _mannequin(spacing: float, tone: str) -> Head:
+    from pipeline.groom.head import distance, skin, surface
+
+    points, triangles, normals = surface.contour()
+    values, origin = surface.collision_grid(spacing)
+    return Head(
+        skin=Skin(points, triangles, normals, skin.albedo(points, normals, tone)),
+        field=Field(values, origin, spacing),
+        scale=1.0,
+        offset=np.zeros(3),
+        project=lambda p: distance.foot(p, reach=surface.REACH),
+    )
+
+
+def _from_mesh(config: Config) -> Head:
+    from pipeline.groom.head.skin import srgb_to_linear
+    from pipeline.groom.head.table import load_table
+    from pipeline.groom.head_mesh import load_mesh, point_normals
+    from pipeline.groom.mesh_distance import distance_grid
+
+    scene = config.scene
+    points, triangles = load_mesh(Path(scene.head), scene.unit_scale, scene.up_axis)
+    normals = point_normals(points, triangles)
+    tone = srgb_to_linear(np.array(load_table()["skin"][scene.skin]))
+    field = distance_grid(points, triangles, config.simulate.contact.spacing)
+    scale, offset = fit_skull(points)
+    fitted = field.rescaled(scale, offset)
+    albedo = np.tile(tone, (len(points), 1)).astype(np.float32)
+    return Head(Skin(points, triangles, normals, albedo), field, scale, offset, _grid_feet(fitted))
+
+
+def fit_skull(points: Points) -> tuple[float, NDArray[np.float64]]:
+    """Scale and offset (3,) that lay the mannequin's skull onto a mesh's: same crown, breadth and occiput."""
+    p = np.asarray(points, np.float64)
+    crown = p[:, 1].max()
+    scale = 1.0
+    for _ in range(20):
+        top = p[p[:, 1] > crown - _TOP * scale]
+        scale = float(np.ptp(top[:, 0])) / _BREADTH
+    middle = 0.5 * (top[:, 0].min() + top[:, 0].max())
+    return scale, np.array([middle, crown - _CROWN * scale, top[:, 2].min() - _OCCIPUT * scale])
+
+
+def _grid_feet(field: Field) -> Feet:
+    def project(p: Points) -> tuple[Points, Points]:
+        for _ in range(2):
+            d, n = field.sample(p)
+            p = p - d[:, None] * n
+        return p, n
+
+    return project

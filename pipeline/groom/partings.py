@@ -1,0 +1,46 @@
+"""The parting: a line on the skull from the hairline to the crown that hair flows away from."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.config.schema import Parting
+from pipeline.groom.head.distance import smoothstep
+from pipeline.groom.head_field import Field
+
+Points = NDArray[np.floating[Any]]
+
+_FRONT, _BACK = 0.10, -0.045  # [m] its ends, in z
+_FADE_FROM, _FADE_OVER = -0.08, 0.09  # [m] an off-centre parting bends to the middle towards the back
+_POINTS = 60
+
+
+class PartingLine:
+    """The parting on a head, in fitted coordinates."""
+
+    def __init__(self, parting: Parting, skin: Field) -> None:
+        self.offset = parting.offset
+        self._z = np.linspace(_BACK, _FRONT, _POINTS)
+        line = np.stack([self._x(self._z), np.full(_POINTS, 0.16), self._z], axis=1)
+        for _ in range(30):  # lower it onto the skin
+            line[:, 1] -= skin.distance(line)
+        self._y = line[:, 1]
+
+    def side(self, p: Points) -> NDArray[np.int8]:
+        """+1 for points to the left of the parting, -1 for those to its right."""
+        return np.where(p[:, 0] > self._x(p[:, 2]), 1, -1).astype(np.int8)
+
+    def away(self, p: Points) -> NDArray[np.float64]:
+        """Unit vectors from the parting's point beside each p."""
+        z = np.clip(p[:, 2], _BACK, _FRONT)
+        v = p - np.stack([self._x(z), np.interp(z, self._z, self._y), z], axis=1)
+        return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9))
+
+    def nearness(self, p: Points, reach: float) -> NDArray[np.float64]:
+        """1 on the parting to 0 at `reach` [m] from it."""
+        z = np.clip(p[:, 2], _BACK, _FRONT)
+        return np.asarray(1 - smoothstep(np.hypot(p[:, 0] - self._x(z), p[:, 2] - z) / reach))
+
+    def _x(self, z: Points) -> NDArray[np.float64]:
+        return np.asarray(self.offset * smoothstep((z - _FADE_FROM) / _FADE_OVER))

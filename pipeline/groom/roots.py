@@ -1,0 +1,65 @@
+"""Roots on the scalp, in an order whose every prefix is evenly spread.
+
+The R2 sequence (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018) in the scalp's equal-area
+chart, thinned by the wanted density times r^2 / cos (skin area per chart area) against the candidate's own hash.
+So strand i depends on the seed and i alone, not on the count.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import InputError
+from pipeline.groom.head import scalp
+from pipeline.groom.head_field import Field
+from pipeline.strands.random import uniform
+
+Points = NDArray[np.floating[Any]]
+
+_PLASTIC = 1.32471795724474602596  # the root of x^3 = x + 1
+_DISC = 0.9  # chart radius that holds the scalp
+_HIGHEST = 0.022  # [m^2] bound of density r^2 / cos
+_BATCH = 1 << 17
+_SALT = 1
+
+
+def place_roots(
+    count: int, seed: int, skin: Field, density: Callable[[Points], Points]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The first `count` roots (S, 3) [m] on the skin and its unit normals there, in fitted coordinates.
+
+    Raises InputError when almost no candidate lands on the scalp.
+    """
+    found: list[NDArray[np.float64]] = []
+    first = total = 0
+    while total < count:
+        index = np.arange(first, first + min(_BATCH, 8 * count + 4096))
+        p = _candidates(index, seed, skin, density)
+        found.append(p)
+        first, total = int(index[-1]) + 1, total + len(p)
+        if first > 10_000 and total < first / 10_000:
+            raise InputError(
+                "scene.head: found no scalp on this mesh; check scene.up_axis and scene.unit_scale"
+            )
+    roots = np.concatenate(found)[:count]
+    for _ in range(2):
+        d, n = skin.sample(roots)
+        roots = roots - d[:, None] * n
+    return roots, skin.sample(roots)[1]
+
+
+def _candidates(
+    index: NDArray[np.int64], seed: int, skin: Field, density: Callable[[Points], Points]
+) -> NDArray[np.float64]:
+    uv = 2 * ((0.5 + index[:, None] * np.array([1 / _PLASTIC, 1 / _PLASTIC**2])) % 1) - 1
+    inside = (uv**2).sum(1) < 1
+    index, ray = index[inside], scalp.rays(_DISC * uv[inside])
+    reach = np.full(len(ray), 0.16)
+    for _ in range(14):  # sphere tracing from outside
+        reach -= skin.distance(scalp.center() + reach[:, None] * ray)
+    p = scalp.center() + reach[:, None] * ray
+    cosine = np.maximum((skin.sample(p)[1] * ray).sum(1), 0.43)
+    kept = uniform(seed, index, _SALT) < density(p) * reach**2 / cosine / _HIGHEST
+    return np.asarray(p[kept])

@@ -1,0 +1,108 @@
+"""Stage 1, the groom: reads the config and what it names, writes groom.h5.
+
+    strands/points (S, P, 3) f32 [m]   rest shapes in the head's rest pose, equal spacing; any prefix is a valid groom
+    strands/normal (S, 3) f32          scalp normal at the root
+    strands/side (S,) i8, key (S,) u32, pins (S, 2) u8
+    guides/strand (G,) u32             which strands are simulated, ascending
+    guides/offset (G, P) f32 [m]       distance that their points keep from the skin
+    head/points, triangles, normals, albedo, distance, origin, spacing     unless scene.head = "none"
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import cache
+from pipeline.config import Config, provenance
+from pipeline.groom.guides import choose_guides
+from pipeline.groom.heads import Head, make_head
+from pipeline.groom.procedural import Style
+from pipeline.groom.swatch import swatch
+from pipeline.progress import say, track
+from pipeline.strands.strands import Strands
+
+
+def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
+    """Make the groom of a config. Raises InputError for a head or a groom file that cannot serve."""
+    head = make_head(config)
+    chunks, count, report = _source(config, head)
+    with cache.create(experiment.groom, "groom", key, provenance(config, "groom")) as writer:
+        points, side = _write_strands(writer, chunks, count)
+        chosen = choose_guides(points, side, config.groom.guides)
+        writer.write("guides/strand", chosen)
+        writer.write("guides/offset", contact_offset(config, head, points[chosen]))
+        if head is not None:
+            _write_head(writer, head)
+        writer.meta["report"] = {"strands": len(points), "guides": len(chosen)} | report
+    say("groom", f"{len(points)} strands, {len(chosen)} guides")
+
+
+def contact_offset(config: Config, head: Head | None, guides: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Distance [m] that guide points (G, P, 3) keep from the skin, (G, P).
+
+    It is the groomed distance between `contact.offset` and `contact.layer`: the hair below holds a guide up. It grows
+    from the root on at most as fast as the strand is long, and shrinks only slowly, so that neighbours of a point
+    agree.
+    """
+    contact = config.simulate.contact
+    if head is None:
+        return np.full(guides.shape[:2], contact.offset, np.float32)
+    groomed = head.field.distance(guides.reshape(-1, 3)).reshape(guides.shape[:2])
+    spacing = np.linalg.norm(np.diff(guides, axis=1), axis=2).mean(axis=1)
+    reach = contact.offset + 0.5 * spacing[:, None] * np.arange(guides.shape[1])
+    offset = np.clip(groomed, contact.offset, np.minimum(max(contact.layer, contact.offset), reach))
+    for j in range(1, offset.shape[1]):
+        offset[:, j] = np.maximum(offset[:, j], offset[:, j - 1] - 0.25 * spacing)
+    return offset.astype(np.float32)
+
+
+def _source(config: Config, head: Head | None) -> tuple[Iterable[Strands], int, dict[str, object]]:
+    """The strands in chunks, their number, and what there is to report."""
+    if config.groom.source == "swatch":
+        return [swatch(config)], config.groom.strands, {}
+    if config.groom.source == "procedural" and head is not None:
+        style = Style(config, head)
+        return style.chunks(), len(style.roots), {}
+    from pipeline.groom.imported import load
+
+    strands, report = load(config, head)
+    return [strands], len(strands), report
+
+
+def _write_strands(
+    writer: cache.Writer, chunks: Iterable[Strands], count: int
+) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
+    """Stream the strands to the file; returns what guides are chosen from."""
+    columns = None
+    points: list[NDArray[np.float32]] = []
+    sides: list[NDArray[np.int8]] = []
+    with track("groom", count, "strand") as bar:
+        for strands in chunks:
+            if columns is None:
+                columns = _columns(writer, strands.points.shape[1])
+            for name, column in columns.items():
+                column.append(getattr(strands, name))
+            points.append(strands.points)
+            sides.append(strands.side)
+            bar.advance(len(strands))
+    return np.concatenate(points), np.concatenate(sides)
+
+
+def _columns(writer: cache.Writer, points: int) -> dict[str, "cache.columns.ColumnWriter"]:
+    layout: dict[str, tuple[tuple[int, ...], type]] = {
+        "points": ((points, 3), np.float32),
+        "normal": ((3,), np.float32),
+        "side": ((), np.int8),
+        "key": ((), np.uint32),
+        "pins": ((2,), np.uint8),
+    }
+    return {name: writer.stream(f"strands/{name}", shape, kind) for name, (shape, kind) in layout.items()}
+
+
+def _write_head(writer: cache.Writer, head: Head) -> None:
+    for name in ("points", "triangles", "normals", "albedo"):
+        writer.write(f"head/{name}", getattr(head.skin, name))
+    writer.write("head/distance", head.field.values)
+    writer.write("head/origin", head.field.origin)
+    writer.write("head/spacing", np.array([head.field.spacing]))

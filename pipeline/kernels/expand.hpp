@@ -1,0 +1,238 @@
+// Expansion: strands from guides by tangent rotation, a lane per strand.
+//
+// Notation: e_j segment j of a strand at rest; A_g(s) rotation of guide g at arc length s since rest (guide_motion.hpp),
+// w_g weights of the strand's guides, the nearest first; phi distance to the head. Everything happens in the head's
+// rest frame and is carried to the world at the end:
+//     x_0 = root,    x_{j+1} = x_j + R_j e_j,    R_j = normalised sum_g w_g A_g(s_j).
+// A rotation keeps lengths, so a strand has its own length whatever R is, and its rest shape where R is the identity.
+// Source: Hsu et al., "Real-time Physically Guided Hair Interpolation" (ACM TOG 43, 2024) for why positions must not be
+// blended; we blend rotations instead of their forces (tests: error against a rod solver, chunks, lengths).
+#pragma once
+
+#include "block.hpp"
+#include "distance_field.hpp"
+#include "guide_motion.hpp"
+#include "vary.hpp"
+
+namespace ringlet {
+
+/// The full count of strands; columns as in `pipeline.strands.expand.Binding`.
+struct BoundStrands {
+    int N, k;
+    const uint32_t *parent;
+    const float *root;
+    const uint32_t *guide;
+    const float *weight;
+    const uint32_t *key;
+    const float *scale, *phase;
+};
+
+inline constexpr int kGuidesMax = 8;
+
+/// A rotation of each strand of a block; not normalised.
+struct Rotation {
+    Lanes<float> w;
+    Vec3<float> u;
+
+    friend RINGLET_INLINE Lanes<float> dot(const Rotation &a, const Rotation &b) { return a.w * b.w + dot(a.u, b.u); }
+
+    RINGLET_INLINE Vec3<float> turn(Vec3<float> a) const {
+        const Vec3<float> c = cross(u, a);
+        return a + (2 / dot(*this, *this)) * (w * c + cross(u, c));
+    }
+};
+
+/// The guides that the strands of a block follow.
+struct Followed {
+    int count;
+    int row[kGuidesMax][kLanes<float>]; // first rotation of the guide
+    Lanes<float> weight[kGuidesMax], step[kGuidesMax]; // step: the strand's spacing in spacings of the guide
+};
+
+/// A_g where segment j of the strand is, between two segments of the guide; beyond the guide's tip its last one.
+RINGLET_INLINE Rotation rotation_at(const GuideMotion &motion, const Followed &to, int g, int j) {
+    constexpr int W = kLanes<float>;
+    const Lanes<float> u = (j + 0.5f) * to.step[g] - 0.5f;
+    const float *rotations = motion.rotations.data(), last = float(motion.Q - 2);
+    const int *row = to.row[g];
+    float along[W], part[4][W];
+    __builtin_memcpy(along, &u, sizeof u);
+#pragma omp simd
+    for (int lane = 0; lane < W; ++lane) {
+        const float v = along[lane] > 0 ? (along[lane] < last ? along[lane] : last) : 0.0f;
+        const int i = int(v) < motion.Q - 3 ? int(v) : motion.Q - 3;
+        const float f = v - i;
+        const float *a = rotations + 4 * (row[lane] + i);
+        for (int c = 0; c < 4; ++c) part[c][lane] = a[c] + f * (a[c + 4] - a[c]);
+    }
+    Rotation r;
+    __builtin_memcpy(&r.w, part[0], sizeof u);
+    __builtin_memcpy(&r.u.x, part[1], sizeof u);
+    __builtin_memcpy(&r.u.y, part[2], sizeof u);
+    __builtin_memcpy(&r.u.z, part[3], sizeof u);
+    return r;
+}
+
+/// R_j, a multiple of it. A guide whose rotation differs from the nearest one's by more than 60 degrees has parted
+/// from it, and a mean of the two would lie in the gap: its weight fades out between 45 and 75 degrees.
+RINGLET_INLINE Rotation blended(const GuideMotion &motion, const Followed &to, int j) {
+    constexpr float kApart = 0.62941f, kTogether = 0.85355f; // cos^2 of half of 75 and 45 degrees
+    const Rotation nearest = rotation_at(motion, to, 0, j);
+    const Lanes<float> square = dot(nearest, nearest);
+    Rotation sum{to.weight[0] * nearest.w, to.weight[0] * nearest.u};
+    for (int g = 1; g < to.count; ++g) {
+        const Rotation other = rotation_at(motion, to, g, j);
+        const Lanes<float> c = dot(nearest, other), cos2 = c * c / (square * dot(other, other));
+        Lanes<float> near = (cos2 - kApart) * (1 / (kTogether - kApart));
+        near = minimum<float>(maximum<float>(near, Lanes<float>{}), splat(1.0f));
+        Lanes<float> weight = to.weight[g] * near * near * (3 - 2 * near);
+        weight = c < 0 ? -weight : weight; // q and -q are one rotation
+        sum.w += weight * other.w;
+        sum.u = sum.u + weight * other.u;
+    }
+    return sum;
+}
+
+/// Keeps segments out of the head. The distance that must be kept grows from the root's own, at most a quarter of the
+/// arc length, so that a strand can always leave the skin, and a root below it comes out gently.
+class Skin {
+  public:
+    Skin(const DistanceField &field, float skin, Vec3<float> root) : field_(field), skin_(skin) {
+        Vec3<float> gradient;
+        sample<float>(field, root, at_root_, gradient);
+        bound_ = at_root_;
+    }
+
+    /// Tilts the segment t from x away from the head so that its end, at arc length s, is outside; keeps its length.
+    RINGLET_INLINE Vec3<float> clear(Vec3<float> x, Vec3<float> t, Lanes<float> s) {
+        // phi cannot fall faster than its steepest slope: most points need no sample
+        const Lanes<float> whole = length(t), keep = minimum<float>(splat(skin_), at_root_ + kRise * s);
+        bound_ -= float(field_.steepest) * whole;
+        Mask<float> near = bound_ < keep;
+        for (int round = 0; round < kRounds && any<float>(near); ++round) {
+            Lanes<float> phi;
+            Vec3<float> gradient;
+            sample<float>(field_, x + t, phi, gradient);
+            bound_ = near ? phi : bound_;
+            near &= phi < keep;
+            t = select(near, tilted(t, whole, gradient, keep - phi), t);
+        }
+        return t;
+    }
+
+  private:
+    static constexpr float kRise = 0.25f;
+    static constexpr int kRounds = 4; // exact in one round over a plane
+
+    /// The segment whose end is higher by `rise`, turned in the plane of itself and the normal; upright at most.
+    static RINGLET_INLINE Vec3<float> tilted(Vec3<float> t, Lanes<float> whole, Vec3<float> gradient, Lanes<float> rise) {
+        const Lanes<float> tiny = splat(1e-12f);
+        const Vec3<float> n = (1 / (length(gradient) + tiny)) * gradient;
+        const Vec3<float> d = (1 / (whole + tiny)) * t;
+        const Lanes<float> up = dot(d, n), wanted = minimum<float>(up + rise / (whole + tiny), splat(1.0f));
+        const Vec3<float> flat = d - up * n;
+        const Lanes<float> along = square_root<float>(1 - wanted * wanted) / (length(flat) + tiny);
+        const Vec3<float> to = wanted * n + along * flat;
+        const Lanes<float> size = length(to);
+        return whole * select(size > 0.5f, (1 / (size + tiny)) * to, n);
+    }
+
+    const DistanceField &field_;
+    float skin_;
+    Lanes<float> at_root_, bound_; // phi at the root; a lower bound of phi at the current point
+};
+
+/// What a thread needs for a block.
+struct ExpandScratch {
+    Arena arena;
+    Vec3<float> *x, *e;
+
+    explicit ExpandScratch(int P)
+        : arena(size_t(2 * P + 2) * sizeof(Vec3<float>)), x(arena.take<Vec3<float>>(P)), e(arena.take<Vec3<float>>(P)) {}
+};
+
+/// One call: the groom (., P, 3), the strands and what moves them.
+struct Expand {
+    const float *rest;
+    int P;
+    const BoundStrands &strands;
+    const GuideMotion &motion;
+    const DistanceField *field; // may be null
+    ExpandStyle style;
+
+    /// Points of strands begin .. begin+count to out (count, P, 3).
+    void run(int begin, int count, float *out, int threads) const {
+        const int blocks = block_count<float>(count);
+#pragma omp parallel num_threads(threads)
+        {
+            ExpandScratch scratch(P);
+#pragma omp for schedule(dynamic, 16)
+            for (int b = 0; b < blocks; ++b) {
+                const BlockIndex<float> index(b, count);
+                block(begin, index, scratch);
+                scatter(scratch.x, out, P, index);
+            }
+        }
+    }
+
+  private:
+    void block(int begin, const BlockIndex<float> &index, const ExpandScratch &scratch) const {
+        int strand[kLanes<float>];
+        for (int lane = 0; lane < kLanes<float>; ++lane) strand[lane] = begin + index.strand[lane];
+        Vec3<float> *x = scratch.x, *e = scratch.e, root;
+        gather(&root, strands.root, 1, strand);
+        segments(strand, root, x, e);
+        Lanes<float> whole{};
+        for (int j = 0; j + 1 < P; ++j) whole += length(e[j]);
+        const Lanes<float> spacing = whole * (1.0f / (P - 1));
+        const Followed to = followed(strand, spacing);
+        x[0] = root;
+        if (field) {
+            Skin skin(*field, style.skin, root);
+            for (int j = 0; j + 1 < P; ++j)
+                x[j + 1] = x[j] + skin.clear(x[j], blended(motion, to, j).turn(e[j]), (j + 1.0f) * spacing);
+        } else {
+            for (int j = 0; j + 1 < P; ++j) x[j + 1] = x[j] + blended(motion, to, j).turn(e[j]);
+        }
+        const Rigid<float> to_world(motion.pose);
+        for (int j = 0; j < P; ++j) x[j] = to_world(x[j]);
+    }
+
+    /// Segments e at rest, of groom strands as they are and of copies varied; x is used for the parents' points.
+    void segments(const int (&strand)[kLanes<float>], Vec3<float> root, Vec3<float> *x, Vec3<float> *e) const {
+        int parent[kLanes<float>];
+        Copies copies{};
+        bool some = false;
+        for (int lane = 0; lane < kLanes<float>; ++lane) {
+            const int s = strand[lane];
+            parent[lane] = int(strands.parent[s]);
+            const bool copy = parent[lane] != s;
+            copies.varied[lane] = copy ? -1 : 0;
+            copies.key[lane] = strands.key[s];
+            copies.scale[lane] = strands.scale[s];
+            copies.cosine[lane] = copy ? std::cos(strands.phase[s]) : 1;
+            copies.sine[lane] = copy ? std::sin(strands.phase[s]) : 0;
+            some |= copy;
+        }
+        gather(x, rest, P, parent);
+        for (int j = 0; j + 1 < P; ++j) e[j] = x[j + 1] - x[j];
+        copies.offset = root - x[0];
+        if (some) vary(e, x, P, copies, style);
+    }
+
+    Followed followed(const int (&strand)[kLanes<float>], Lanes<float> spacing) const {
+        Followed to;
+        to.count = strands.k;
+        for (int g = 0; g < to.count; ++g)
+            for (int lane = 0; lane < kLanes<float>; ++lane) {
+                const size_t at = size_t(strand[lane]) * strands.k + g;
+                const int guide = int(strands.guide[at]);
+                to.row[g][lane] = guide * (motion.Q - 1);
+                to.weight[g][lane] = strands.weight[at];
+                to.step[g][lane] = spacing[lane] / motion.spacing[guide];
+            }
+        return to;
+    }
+};
+
+} // namespace ringlet

@@ -1,0 +1,176 @@
+"""Light scattered by one hair fibre, seen from afar: tables for the shading kernel.
+
+A fibre scatters in four lobes p = R, TT, TRT and the rest (TRRT and beyond): S = sum M_p N_p. M_p, along the fibre,
+has a closed form that the kernel evaluates; N_p, around it, is the mean over the offset h across the fibre,
+
+    N_p(theta_d, phi) = 1/2 int_{-1}^{1} A_p(h) D_p(phi - Phi_p(h)) dh,
+
+and G_p its mean over phi +- pi/2, which multiple scattering needs. theta_d = (theta_o - theta_i) / 2; phi = 0 has the
+light and the eye on the same side; absorption sigma_a is in 1 / (fibre radius).
+
+Sources: Marschner et al., Light Scattering from Human Hair Fibers, SIGGRAPH 2003 (lobes); d'Eon et al., An
+Energy-Conserving Hair Reflectance Model, EGSR 2011 (A_p, M_p); Chiang et al., A Practical and Controllable Hair and
+Fur Model, Eurographics 2016, eq. 7-8 (D_p, roughness). Unlike Chiang we take Fresnel and absorption at theta_d, not
+theta_o: reciprocal, and one axis less; `test_white_fibre_keeps_all_light` bounds what that loses.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import kernels
+
+_F32 = NDArray[np.float32]
+_F64 = NDArray[np.float64]
+
+ETA: Final = 1.55
+"""Refractive index of keratin."""
+ABSORPTION_MAX: Final = 8.0
+"""[1/radius] absorption at the last level: darker hair shows only its R lobe, as this does."""
+LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 24, 48, 140
+
+_EUMELANIN: Final = np.array([0.506, 0.841, 1.653])
+_PHEOMELANIN: Final = np.array([0.343, 0.733, 1.924])
+
+
+def absorption(melanin: _F32 | _F64 | float, redness: float) -> _F32:
+    """Absorption (..., 3) float32 [1/radius] for R, G, B of hair with this melanin (...), 0 .. 1.
+
+    Redness is the share of pheomelanin. Source: d'Eon et al. 2011 for the two spectra; the logarithm, which makes
+    equal steps of melanin look equal, is that of Cycles' principled hair.
+    """
+    amount = -np.log(np.maximum(1 - np.asarray(melanin, np.float64), 1e-4))
+    spectrum = (1 - redness) * _EUMELANIN + redness * _PHEOMELANIN
+    return (amount[..., None] * spectrum).astype(np.float32)
+
+
+def variance(roughness: float) -> _F64:
+    """Longitudinal variance v (4,) of the lobes (Chiang et al. 2016, eq. 7)."""
+    v = (0.726 * roughness + 0.812 * roughness**2 + 3.7 * roughness**20) ** 2
+    return v * np.array([1.0, 0.25, 4.0, 4.0])
+
+
+def scale(roughness: float) -> float:
+    """Scale s of the azimuthal logistic (Chiang et al. 2016, eq. 8)."""
+    return float(np.sqrt(np.pi / 8) * (0.265 * roughness + 1.194 * roughness**2 + 5.372 * roughness**22))
+
+
+def fresnel(cosine: _F64) -> _F64:
+    """Reflectance of unpolarised light that meets keratin at this cosine of incidence."""
+    inside = np.sqrt(1 - (1 - cosine**2) / ETA**2)
+    parallel = (ETA * cosine - inside) / (ETA * cosine + inside)
+    perpendicular = (cosine - ETA * inside) / (cosine + ETA * inside)
+    return (parallel**2 + perpendicular**2) / 2
+
+
+def attenuation(cosine: _F64, h: _F64, sigma: _F64) -> _F64:
+    """A_p (4, ...): what leaves in each lobe, at cos(theta), offset h and absorption sigma; sums to 1 at sigma = 0."""
+    sine2 = 1 - cosine**2
+    inner = np.sqrt(1 - (h * cosine) ** 2 / (ETA**2 - sine2))
+    transmitted = np.exp(-2 * sigma * inner / np.sqrt(1 - sine2 / ETA**2))
+    f = fresnel(cosine * np.sqrt(1 - h**2)) + 0 * transmitted
+    tt = (1 - f) ** 2 * transmitted
+    trt = tt * transmitted * f
+    return np.stack([f, tt, trt, trt * transmitted * f / (1 - transmitted * f)])
+
+
+def deflection(p: int, cosine: _F64, h: _F64) -> _F64:
+    """Phi_p [rad]: the azimuth in which a ray leaves that met the smooth fibre at offset h."""
+    inner = np.arcsin(h * cosine / np.sqrt(ETA**2 - 1 + cosine**2))
+    return 2 * p * inner - 2 * np.arcsin(h) + p * np.pi
+
+
+def logistic(x: _F64, s: float) -> _F64:
+    """D: density [1/rad] of the logistic trimmed to one turn, at any angle x."""
+    e = np.exp(-np.abs((x + np.pi) % (2 * np.pi) - np.pi) / s)
+    return e / (s * (1 + e) ** 2 * np.tanh(np.pi / (2 * s)))
+
+
+def logistic_integral(x: _F64, s: float) -> _F64:
+    """Integral of D from 0 to any angle x; grows by 1 with every turn."""
+    turns = np.floor((x + np.pi) / (2 * np.pi))
+    return turns + np.tanh((x - 2 * np.pi * turns) / (2 * s)) / (2 * np.tanh(np.pi / (2 * s)))
+
+
+def far_field(cosine: _F64, phi: _F64, sigma: _F64, azimuthal_roughness: float) -> tuple[_F64, _F64]:
+    """N and its half-circle mean G, both (4, A, T, H) [1/rad].
+
+    Args:
+        cosine: (T,) of theta_d, > 0.
+        phi: (H,) [rad].
+        sigma: (A,) [1/radius].
+        azimuthal_roughness: 0.1 .. 1.
+
+    """
+    s = scale(azimuthal_roughness)
+    h, weight = np.polynomial.legendre.leggauss(NODES)
+    # A is even in h and Phi odd: nodes h > 0 see phi and -phi
+    h, weight = h[NODES // 2 :], weight[NODES // 2 :] / 2
+    leaving = weight * attenuation(cosine[:, None], h, sigma[:, None, None])
+    lobes, means = (np.empty((4, sigma.size, cosine.size, phi.size)) for _ in range(2))
+    for p in range(3):
+        for t, c in enumerate(cosine):
+            x = np.stack([phi, -phi])[..., None] - deflection(p, c, h)
+            half_turn = logistic_integral(x + np.pi / 2, s) - logistic_integral(x - np.pi / 2, s)
+            lobes[p, :, t] = leaving[p, :, t] @ logistic(x, s).sum(0).T
+            means[p, :, t] = leaving[p, :, t] @ half_turn.sum(0).T / np.pi
+    lobes[3] = means[3] = 2 * leaving[3].sum(-1)[..., None] / (2 * np.pi)
+    return lobes, means
+
+
+@dataclass(frozen=True)
+class Scattering:
+    """The tables of one kind of fibre: roughness along and around it, tilt [rad] of the cuticle's scales to the root."""
+
+    roughness: float
+    azimuthal_roughness: float
+    tilt: float
+
+    @cached_property
+    def far_field(self) -> tuple[_F64, _F64]:
+        """N and G (4, A, T, H) on the grid of the tables."""
+        theta = np.linspace(0, np.pi / 2, INCLINATIONS)
+        phi = np.linspace(0, np.pi, AZIMUTHS)
+        # Grazing light: the last inclination stays just off the fibre's own direction
+        return far_field(np.cos(np.minimum(theta, 1.5707)), phi, self.levels, self.azimuthal_roughness)
+
+    @property
+    def levels(self) -> _F64:
+        """Absorption (A,) [1/radius] of the levels, uniform in its root."""
+        return ABSORPTION_MAX * np.linspace(0, 1, LEVELS) ** 2
+
+    @cached_property
+    def sums(self) -> _F64:
+        """(A, T, 8): a_f, a_b, circle means of N for R, TT, TRT + rest, spreads v_f, v_b of forward and back, 0."""
+        _, means = self.far_field
+        v = variance(self.roughness)[:, None, None]
+        back, forward = np.pi * means[..., 0], np.pi * means[..., -1]
+        circle = (back + forward) / (2 * np.pi)
+        a_f, a_b = forward.sum(0), back.sum(0)
+        v_f, v_b = (v * forward).sum(0) / a_f, (v * back).sum(0) / a_b
+        return np.stack([a_f, a_b, circle[0], circle[1], circle[2] + circle[3], v_f, v_b, 0 * a_f], axis=-1)
+
+    def loss(self, sigma: _F32) -> _F32:
+        """Part k of the light that a fibre takes away for good, for absorption sigma (...): same shape, float32.
+
+        k = sqrt((1 - a_f)^2 - a_b^2), the decay of diffuse light with the number of fibres; 0 for white hair.
+        """
+        a_f, a_b = (np.interp(np.sqrt(sigma), np.sqrt(self.levels), self.sums[:, 0, i]) for i in range(2))
+        return np.sqrt(np.maximum((1 - a_f) ** 2 - a_b**2, 0)).astype(np.float32)
+
+    def tables(self) -> kernels.FibreTables:
+        """The tables as the shading kernel takes them."""
+        lobes, means = self.far_field
+        record = [*lobes, means[0], means[1], means[2] + means[3], 0 * means[0]]
+        # The cuticle's scales lean towards the tip: R turns to the tip, TT and TRT to the root
+        tilt = self.tilt * np.array([2.0, -1.0, -4.0, 0.0])
+        return kernels.FibreTables(
+            np.ascontiguousarray(np.stack(record, axis=-1), np.float32),
+            np.ascontiguousarray(self.sums, np.float32),
+            variance(self.roughness).astype(np.float32),
+            tilt.astype(np.float32),
+            ABSORPTION_MAX,
+        )

@@ -1,0 +1,170 @@
+import json
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as nps
+
+from pipeline import cache
+from pipeline.errors import InputError
+
+
+def write_groom(path: Path, strands: int = 500) -> np.ndarray:
+    points = np.random.default_rng(3).normal(size=(strands, 16, 3)).astype(np.float32)
+    with cache.create(path, kind="groom", key="k1", provenance={"seed": 3}) as writer:
+        writer.write("strands/points", points, chunk_rows=64)
+        writer.write("strands/side", np.arange(strands, dtype=np.int8) % 2)
+        writer.meta["report"] = {"repaired": [1, 5]}
+    return points
+
+
+def read_all(path: Path) -> dict[str, np.ndarray]:
+    with cache.open(path, kind="groom") as reader:
+        return {name: reader[name][:] for name in reader.names}
+
+
+def test_what_was_written_is_read(tmp_path: Path) -> None:
+    points = write_groom(tmp_path / "groom.h5")
+    with cache.open(tmp_path / "groom.h5", kind="groom") as reader:
+        assert reader.key == "k1"
+        assert reader.meta["report"] == {"repaired": [1, 5]}
+        assert reader.provenance["seed"] == 3
+        assert {"host", "libraries", "written", "wall_time_s"} <= reader.provenance.keys()
+        column = reader["strands/points"]
+        for rows in (slice(None), slice(60, 70), slice(10, 10), slice(-3, None), slice(None, None, 7)):
+            np.testing.assert_array_equal(column[rows], points[rows])
+        np.testing.assert_array_equal(column[-1], points[-1])
+        np.testing.assert_array_equal(column[np.array([3, 499, 0])], points[[3, 499, 0]])
+        np.testing.assert_array_equal(np.asarray(column), points)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    array=nps.arrays(
+        st.sampled_from([np.float32, np.float64, np.int8, np.uint32, np.int64]),
+        nps.array_shapes(min_dims=1, max_dims=3, min_side=1, max_side=9),
+    ),
+    chunk=st.one_of(st.none(), st.integers(1, 12)),
+    cut=st.integers(0, 9),
+)
+def test_any_array_in_any_pieces_comes_back(
+    tmp_path: Path, array: np.ndarray, chunk: int | None, cut: int
+) -> None:
+    with cache.create(tmp_path / "any.h5", kind="any", key="") as writer:
+        column = writer.stream("a", array.shape[1:], array.dtype, chunk)
+        column.append(array[:cut])
+        column.append(array[cut:])
+    with cache.open(tmp_path / "any.h5") as reader:
+        np.testing.assert_array_equal(reader["a"][:], array)
+        assert reader["a"].dtype == array.dtype
+
+
+def test_other_hdf5_readers_understand_the_columns(tmp_path: Path) -> None:
+    import h5py
+
+    points = write_groom(tmp_path / "groom.h5")
+    with h5py.File(tmp_path / "groom.h5") as file:
+        np.testing.assert_array_equal(file["strands/points"][:], points)
+        assert json.loads(file["provenance/record"][()])["seed"] == 3
+
+
+def test_empty_columns_are_columns(tmp_path: Path) -> None:
+    with cache.create(tmp_path / "e.h5", kind="any", key="") as writer:
+        writer.write("none", np.zeros((0, 3), np.float32))
+    with cache.open(tmp_path / "e.h5") as reader:
+        reader.verify()
+        assert reader["none"][:].shape == (0, 3)
+
+
+def test_two_runs_differ_in_the_record_only(tmp_path: Path) -> None:
+    for name in ("a.h5", "b.h5"):
+        write_groom(tmp_path / name)
+    a, b = read_all(tmp_path / "a.h5"), read_all(tmp_path / "b.h5")
+    assert a.keys() == b.keys()
+    for name in a:
+        np.testing.assert_array_equal(a[name], b[name])
+
+
+@pytest.mark.parametrize("start", [0, 1])
+def test_a_flipped_bit_is_found_or_harmless(tmp_path: Path, start: int) -> None:
+    """Flip one bit anywhere: either reading raises Damaged, or every value is still right."""
+    path = tmp_path / "groom.h5"
+    write_groom(path)
+    whole, right = path.read_bytes(), read_all(path)
+    rng = random.Random(start)
+    found = 0
+    trials = 250
+    for _ in range(trials):
+        broken = bytearray(whole)
+        broken[rng.randrange(len(broken))] ^= 1 << rng.randrange(8)
+        path.write_bytes(broken)
+        try:
+            values = read_all(path)
+        except cache.Damaged as error:
+            found += str(path) in str(error)
+            continue
+        assert values.keys() == right.keys()
+        for name in right:
+            np.testing.assert_array_equal(values[name], right[name])
+    print(f"{found} of {trials} flipped bits found, the others were in unused bytes")
+    assert found > trials // 2  # a message without the path does not count
+
+
+def test_a_flipped_bit_in_the_data_names_file_and_dataset(tmp_path: Path) -> None:
+    path = tmp_path / "groom.h5"
+    points = write_groom(path)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(cache.Damaged, match=r"groom\.h5: .*strands/points"), cache.open(path) as reader:
+        reader.verify()
+    with cache.open(path) as reader:
+        np.testing.assert_array_equal(reader["strands/points"][:64], points[:64])
+
+
+@pytest.mark.parametrize("length", [0, 7, 2000])
+def test_a_truncated_file_is_damaged(tmp_path: Path, length: int) -> None:
+    path = tmp_path / "groom.h5"
+    write_groom(path)
+    path.write_bytes(path.read_bytes()[:length])
+    with pytest.raises(cache.Damaged, match="damaged"), cache.open(path):
+        pass
+
+
+def test_a_foreign_hdf5_file_is_refused(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["a"] = [1, 2]
+    with pytest.raises(cache.Damaged, match="not a file of the cache"), cache.open(tmp_path / "x.h5"):
+        pass
+
+
+def test_missing_file_and_wrong_kind_are_told(tmp_path: Path) -> None:
+    write_groom(tmp_path / "groom.h5")
+    with pytest.raises(cache.Missing, match="ringlet run"), cache.open(tmp_path / "none.h5"):
+        pass
+    with (
+        pytest.raises(InputError, match="kind groom; expected strands"),
+        cache.open(tmp_path / "groom.h5", kind="strands"),
+    ):
+        pass
+    with cache.open(tmp_path / "groom.h5") as reader, pytest.raises(KeyError, match="it has strands/points"):
+        reader["strands/pointz"]
+
+
+def test_wrong_rows_are_refused(tmp_path: Path) -> None:
+    with (
+        pytest.raises(ValueError, match=r"strands/points: expected rows of shape \(4, 3\)"),
+        cache.create(tmp_path / "g.h5", kind="groom", key="") as writer,
+    ):
+        writer.stream("strands/points", (4, 3), np.float32).append(np.zeros((2, 5, 3), np.float32))
+    with (
+        pytest.raises(TypeError, match="same_kind"),
+        cache.create(tmp_path / "g.h5", kind="groom", key="") as writer,
+    ):
+        writer.stream("n", (), np.uint32).append(np.array([0.5]))
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,43 @@
+"""`ringlet` with stages that write tiny files in no time, to test what runs when; logs each stage it runs."""
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from pipeline import cache
+from pipeline.cli.main import main
+from pipeline.cli.stages import Batch
+from pipeline.config import keys, provenance
+
+
+def execute(batch: Batch, stage: str, frames: tuple[int, ...]) -> None:
+    log(f"{stage} {' '.join(str(frame) for frame in frames)}".rstrip())
+    key, record = batch.keys[stage], provenance(batch.config, stage)
+    if stage == "render":
+        pixels = np.zeros((4, 4, 3), np.uint8)
+        for number in frames:
+            cache.write_picture(batch.experiment.frames / f"{number:04d}.png", pixels, key, record)
+    elif stage == "simulate":
+        with cache.create_guides(batch.file(stage), key, record, guides=1, points=8, fps=24) as writer:
+            writer.append(np.zeros((1, 8, 3)), np.eye(4))
+    else:
+        with cache.create(
+            batch.file(stage), kind="groom" if stage == "groom" else "strands", key=key, provenance=record
+        ) as writer:
+            writer.write("strands/points", np.zeros((2, 8, 3), np.float32))
+
+
+def log(line: str) -> None:
+    if path := os.environ.get("RINGLET_TEST_LOG"):
+        with Path(path).open("a") as file:
+            file.write(line + "\n")
+
+
+if __name__ == "__main__":
+    keys.code_version = lambda _stage: "fixed"
+    Batch.execute = execute  # type: ignore[method-assign]
+    if sys.argv[1] == "keys":
+        log("keys")
+    main()
