@@ -54,7 +54,7 @@ WANTED  := $(sort $(filter $(NAMES),$(GOALS)) $(if $(filter render movie sheet,$
 
 ifneq ($(WANTED),)
 # Which frames there are and which key each stage has, `ringlet keys` writes down: see pipeline/cli/stamps.py.
-SOURCES := $(wildcard pipeline/*.py pipeline/*/*.py) $(KERNEL_SOURCES)
+SOURCES := $(wildcard pipeline/*.py pipeline/*/*.py pipeline/*/*/*.py pipeline/*/*/*.json) $(KERNEL_SOURCES)
 
 define rules
 outputs/$1/targets.mk: $(lastword $(subst |, ,$(filter $1|%,$(ALL)))) $(SOURCES) $(KERNELS) | $(ENV)

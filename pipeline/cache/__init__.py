@@ -1,7 +1,7 @@
 """What every stage leaves behind: one HDF5 file that is whole, verified and keyed by what it was made from."""
 
 from pipeline.cache.atomic import replacing
-from pipeline.cache.columns import Damaged
+from pipeline.cache.columns import Column, ColumnWriter, Damaged
 from pipeline.cache.experiment import Experiment
 from pipeline.cache.guides import GuidesReader, GuidesWriter, create_guides, open_guides
 from pipeline.cache.pictures import picture_record, write_picture
@@ -9,6 +9,8 @@ from pipeline.cache.segments import Frame, Segments
 from pipeline.cache.store import Missing, Reader, Writer, create, open
 
 __all__ = [
+    "Column",
+    "ColumnWriter",
     "Damaged",
     "Experiment",
     "Frame",

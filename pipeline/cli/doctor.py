@@ -12,6 +12,7 @@ from pathlib import Path
 _GB = 1e9
 _LOW_MEMORY, _LOW_DISK = 2 * _GB, 2 * _GB
 _GL_TIMEOUT_S = 60
+_OPEN_GL = "from pipeline.render.target import Target; print(Target(16, 16, (0.0, 0.0, 0.0)).renderer_name)"
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def _kernels() -> Check:
 
 def _gl() -> Check:
     # In a process of its own: a broken driver ends it without asking.
-    command = [sys.executable, "-m", "pipeline.render.probe"]
+    command = [sys.executable, "-c", _OPEN_GL]
     try:
         result = subprocess.run(command, capture_output=True, text=True, timeout=_GL_TIMEOUT_S)
     except subprocess.TimeoutExpired:

@@ -27,6 +27,7 @@ def call(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code; errors of the user are printed without a traceback."""
     try:
         code = app(list(arguments), exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
     except CycloptsError as error:
         print(f"ringlet: {error}\nringlet --help lists the commands", file=sys.stderr)
         return WRONG_INPUT
@@ -36,6 +37,11 @@ def call(arguments: Sequence[str]) -> int:
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
+    except OSError as error:  # a folder that may not be written, a path that is no folder
+        if error.filename is None:
+            raise
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+        return WRONG_INPUT
     except KeyboardInterrupt:
         print("ringlet: interrupted; what is finished stays", file=sys.stderr)
         return INTERRUPTED

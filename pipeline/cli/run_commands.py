@@ -1,7 +1,7 @@
 """Commands that make something: run, one per stage, movie, sheet, and what make needs."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -16,6 +16,10 @@ from pipeline.cli.base import (
     load_config,
 )
 from pipeline.errors import InputError
+
+if TYPE_CHECKING:
+    from pipeline.cache import Experiment
+    from pipeline.config import Loaded
 
 FrameRange = Annotated[
     str, Parameter(show_default=False, help='Only these frames, counted from 1: "10-20", or one, "7".')
@@ -73,7 +77,7 @@ def movie(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUT
 
     loaded = load_config(config, settings)
     experiment = experiment_of(loaded, outputs)
-    print(write_movie(_rendered(experiment.frames), experiment.folder, loaded.config.simulate.fps))
+    print(write_movie(_rendered(loaded, experiment), experiment.folder, loaded.config.simulate.fps))
 
 
 @app.command(group=STAGES_GROUP, sort_key=7)
@@ -81,8 +85,9 @@ def sheet(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUT
     """Put small copies of the frames on one page: the contact sheet."""
     from pipeline.render.movie import write_sheet
 
-    experiment = experiment_of(load_config(config, settings), outputs)
-    print(write_sheet(_rendered(experiment.frames), experiment.folder))
+    loaded = load_config(config, settings)
+    experiment = experiment_of(loaded, outputs)
+    print(write_sheet(_rendered(loaded, experiment), experiment.folder))
 
 
 @app.command(group=STAGES_GROUP, sort_key=8)
@@ -130,8 +135,13 @@ def _frame_range(text: str, count: int) -> range | None:
     return wanted
 
 
-def _rendered(folder: Path) -> list[Path]:
-    frames = sorted(folder.glob("[0-9]*.png"))
-    if not frames:
-        raise InputError(f"{folder}: no frames yet; `ringlet run` makes them")
+def _rendered(loaded: "Loaded", experiment: "Experiment") -> list[Path]:
+    """List the frames of a config; frames that an older run left behind are no part of it."""
+    numbers = range(1, loaded.config.simulate.frames + 1)
+    frames = [experiment.frames / f"{number:04d}.png" for number in numbers]
+    missing = [frame for frame in frames if not frame.exists()]
+    if missing:
+        raise InputError(
+            f"{missing[0]}: no such frame; `ringlet run` makes the {len(missing)} that are missing"
+        )
     return frames

@@ -47,6 +47,7 @@ _UPSTREAM: dict[str, tuple[str, ...]] = {
     "interpolate": ("groom",),
     "render": ("groom", "simulate", "interpolate"),
 }
+_NOT_SOURCES = (".pyc", ".pyi", ".so")
 _SHARED_CODE = ("kernels", "strands", "cache")
 
 
@@ -103,7 +104,7 @@ def code_version(stage: str) -> str:
     digest = hashlib.blake2b(digest_size=8)
     for folder in (stage, *_SHARED_CODE):
         for file in sorted((package / folder).rglob("*")):
-            if file.suffix in (".py", ".hpp", ".cpp", ".txt"):
+            if file.is_file() and file.suffix not in _NOT_SOURCES:
                 digest.update(f"{file.relative_to(package)}\n".encode())
                 digest.update(file.read_bytes())
     return digest.hexdigest()

@@ -286,7 +286,7 @@ class Simulate(Section):
     precision: Literal["float32", "float64"] = "float32"
     """Precision of the guides."""
     theta: Annotated[float, Field(ge=0.5, le=1)] = 0.6
-    """Implicitness: 1 is the most robust, 0.5 loses no energy."""
+    """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond."""
     torsion: Literal["rotor", "frenet", "none"] = "rotor"
     """Torsion model: "rotor" (4-point, one minimum), "frenet" (the lecture's, regularised) or "none"."""
     relaxation: Literal["newton", "sweep"] = "newton"

@@ -32,14 +32,16 @@ struct Report {
     int bad_strand = -1;
 };
 
-template <class Real> void read(Motion<Real> &motion, const StateArrays<Real> &state, int P, const BlockIndex<Real> &index) {
+template <class Real>
+void read(Motion<Real> &motion, const StateArrays<Real> &state, int P, const BlockIndex<Real> &index) {
     gather(motion.x, state.points, P, index.strand);
     gather(motion.v, state.velocity, P, index.strand);
     gather<Real>(motion.T, state.tension, P - 1, P - 1, index.strand);
     gather<Real>(motion.touch, state.contact, P, P, index.strand);
 }
 
-template <class Real> void write(const Motion<Real> &motion, StateArrays<Real> &state, int P, const BlockIndex<Real> &index) {
+template <class Real>
+void write(const Motion<Real> &motion, StateArrays<Real> &state, int P, const BlockIndex<Real> &index) {
     scatter(motion.x, state.points, P, index);
     scatter(motion.v, state.velocity, P, index);
     scatter<Real>(motion.T, state.tension, P - 1, index);
@@ -55,8 +57,8 @@ template <class Real> Mask<Real> own_lanes(const BlockIndex<Real> &index) {
 
 /// Steps one block of strands through the whole drive.
 template <class Real>
-void advance_block(Stepper<Real> &stepper, const BlockIndex<Real> &index, StateArrays<Real> &state, const RestShape &rest,
-                   const Drive &drive, const StepSettings &settings) {
+void advance_block(Stepper<Real> &stepper, const BlockIndex<Real> &index, StateArrays<Real> &state,
+                   const RestShape &rest, const Drive &drive, const StepSettings &settings) {
     stepper.tally = {};
     read(stepper.block, rest, index);
     read(stepper.now, state, rest.P, index);

@@ -34,7 +34,8 @@ static Doubles apply(Operator op, const Points &points, const std::string &form,
 }
 
 static void check_fits(const Points &points, const RestShape &rest) {
-    require(int(points.shape(0)) == rest.S && int(points.shape(1)) == rest.P, "points: expected (S, P, 3) of the rest shape");
+    require(int(points.shape(0)) == rest.S && int(points.shape(1)) == rest.P,
+            "points: expected (S, P, 3) of the rest shape");
 }
 
 using Energy = Lanes<double> (*)(const Block<double> &, Edges<double> &);

@@ -42,7 +42,8 @@ static State make_state(Reals points, Reals velocity, Reals tension, Flags conta
     require(is_points(points) && is_points(velocity), "State: expected points and velocity (S, P, 3)");
     const size_t S = points.shape(0), P = points.shape(1);
     require(velocity.shape(0) == S && velocity.shape(1) == P, "State: velocity has another shape than points");
-    require(tension.ndim() == 2 && tension.shape(0) == S && tension.shape(1) + 1 == P, "State: expected tension (S, P-1)");
+    require(tension.ndim() == 2 && tension.shape(0) == S && tension.shape(1) + 1 == P,
+            "State: expected tension (S, P-1)");
     require(contact.shape(0) == S && contact.shape(1) == P, "State: expected contact (S, P)");
     require(points.dtype() == nb::dtype<float>() || points.dtype() == nb::dtype<double>(),
             "State: expected float32 or float64");
@@ -53,7 +54,8 @@ static State make_state(Reals points, Reals velocity, Reals tension, Flags conta
 
 template <class Real> static State resting(const Reals &points) {
     const size_t S = points.shape(0), P = points.shape(1);
-    auto x = new_array<Real>({S, P, size_t(3)}), v = new_array<Real>({S, P, size_t(3)}), T = new_array<Real>({S, P - 1});
+    auto x = new_array<Real>({S, P, size_t(3)}), v = new_array<Real>({S, P, size_t(3)});
+    auto T = new_array<Real>({S, P - 1});
     auto contact = new_array<uint8_t>({S, P});
     std::copy_n(static_cast<const Real *>(points.data()), S * P * 3, x.data());
     return {Reals(x), Reals(v), Reals(T), Flags(contact)};
@@ -100,7 +102,8 @@ static std::tuple<Doubles, Doubles> distance(const DistanceField &field, Array<c
 }
 
 static Drive make_drive(Matrices head, Array<const double, -1, 3> wind, std::optional<Matrices> hand) {
-    require(head.shape(0) >= 1 && head.shape(0) == wind.shape(0) + 1, "Drive: expected head (n+1, 4, 4) and wind (n, 3)");
+    require(head.shape(0) >= 1 && head.shape(0) == wind.shape(0) + 1,
+            "Drive: expected head (n+1, 4, 4) and wind (n, 3)");
     require(!hand || hand->shape(0) == head.shape(0), "Drive: expected hand (n+1, 4, 4)");
     Drive drive;
     drive.steps = int(wind.shape(0));
@@ -121,7 +124,8 @@ static void check_settings(const StepSettings &s) {
 }
 
 static void check_fits(const State &state, const RestShape &rest) {
-    require(int(state.S()) == rest.S && int(state.P()) == rest.P, "state and rest shape have different numbers of strands or points");
+    require(int(state.S()) == rest.S && int(state.P()) == rest.P,
+            "state and rest shape have different numbers of strands or points");
 }
 
 static Report advance_state(State &state, const RestShape &rest, const DistanceField *field, const Drive &drive,
@@ -147,7 +151,8 @@ static void block_energies(const Block<double> &b, const Motion<double> &at, con
     }
 }
 
-template <class Real> static Doubles energies_of(const State &state, const RestShape &rest, const StepSettings &settings) {
+template <class Real>
+static Doubles energies_of(const State &state, const RestShape &rest, const StepSettings &settings) {
     const int P = rest.P;
     auto values = new_array<double>({size_t(rest.S), 4});
     Arena arena(sizeof(Lanes<double>) * 64 * (P + 8));
@@ -193,7 +198,8 @@ static void set_torsion(StepSettings &settings, const std::string &name) {
 
 static std::tuple<Doubles, int> relax(Array<const double, -1, -1, 3> points, const RestShape &rest,
                                       const std::string &method, double tolerance) {
-    require(int(points.shape(0)) == rest.S && int(points.shape(1)) == rest.P, "points: expected (S, P, 3) of the rest shape");
+    require(int(points.shape(0)) == rest.S && int(points.shape(1)) == rest.P,
+            "points: expected (S, P, 3) of the rest shape");
     const bool newton = relaxation_named(method) == Relaxation::newton;
     const int P = rest.P;
     auto relaxed = new_array<double>({size_t(rest.S), size_t(P), 3});
@@ -233,7 +239,9 @@ static void bind_settings(nb::module_ &m) {
         .def_prop_rw("torsion", &torsion_name, &set_torsion);
     cls.def_prop_rw(
         "gravity", [](const StepSettings &s) { return std::tuple(s.gravity[0], s.gravity[1], s.gravity[2]); },
-        [](StepSettings &s, std::tuple<double, double, double> g) { std::tie(s.gravity[0], s.gravity[1], s.gravity[2]) = g; });
+        [](StepSettings &s, std::tuple<double, double, double> g) {
+            std::tie(s.gravity[0], s.gravity[1], s.gravity[2]) = g;
+        });
     cls.def_prop_rw(
         "relaxation", [](const StepSettings &s) { return s.relaxation == Relaxation::newton ? "newton" : "sweep"; },
         [](StepSettings &s, const std::string &name) { s.relaxation = relaxation_named(name); });
@@ -256,9 +264,9 @@ static void bind_values(nb::module_ &m) {
         .def_prop_ro("tension", [](State &state) { return state.tension; }, nb::rv_policy::automatic)
         .def_prop_ro("contact", [](State &state) { return state.contact; }, nb::rv_policy::automatic);
     nb::class_<DistanceField>(m, "DistanceField")
-        .def("__init__", [](DistanceField *self, Array<const float, -1, -1, -1> values, Array<const double, 3> origin, double spacing) {
-            new (self) DistanceField(make_field(values, origin, spacing));
-        }, nb::arg("values"), nb::arg("origin"), nb::arg("spacing"));
+        .def("__init__", [](DistanceField *self, Array<const float, -1, -1, -1> values, Array<const double, 3> origin,
+                            double spacing) { new (self) DistanceField(make_field(values, origin, spacing)); },
+             nb::arg("values"), nb::arg("origin"), nb::arg("spacing"));
     nb::class_<Drive>(m, "Drive")
         .def("__init__", [](Drive *self, Matrices head, Array<const double, -1, 3> wind, std::optional<Matrices> hand) {
             new (self) Drive(make_drive(head, wind, hand));

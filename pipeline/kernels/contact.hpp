@@ -47,7 +47,8 @@ template <class Real> struct Contacts {
 
     /// Samples the field at point i; false when no lane can be within `reach` of the surface. A sample is spared when
     /// the last one and the steepest slope of the field prove as much.
-    RINGLET_INLINE bool near(const HeadStep<Real> &head, int i, Vec3<Real> x, L reach, L &distance, Vec3<Real> &normal) {
+    RINGLET_INLINE bool near(const HeadStep<Real> &head, int i, Vec3<Real> x, L reach, L &distance,
+                             Vec3<Real> &normal) {
         const Vec3<Real> at = head.local(x), moved = at - nearby[i];
         L bound = phi[i] - Real(head.field->steepest) * square_root<Real>(dot(moved, moved));
         if (!any<Real>(~(bound > reach))) return false;

@@ -43,7 +43,8 @@ struct DistanceField {
 /// Distance phi and its gradient (not normalised) at points of the head's rest frame. Not-a-number gives the value at
 /// the grid's first corner, never a read outside the grid.
 template <class Real>
-__attribute__((noinline)) void sample(const DistanceField &field, Vec3<Real> x, Lanes<Real> &phi, Vec3<Real> &gradient) {
+__attribute__((noinline)) void sample(const DistanceField &field, Vec3<Real> x, Lanes<Real> &phi,
+                                      Vec3<Real> &gradient) {
     constexpr int W = kLanes<Real>;
     const int ny = field.n[1], nz = field.n[2], row = ny * nz;
     const Real inverse = Real(1 / field.spacing);

@@ -5,6 +5,8 @@
 
 #include "simd.hpp"
 
+#include <initializer_list>
+
 namespace ringlet {
 
 using Floats = Lanes<float>;

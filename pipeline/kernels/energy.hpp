@@ -94,7 +94,8 @@ template <class Real> Lanes<Real> add_rotor(const Block<Real> &b, Edges<Real> &e
         const Lanes<Real> C = b.C[i], S = b.S[i], rho = b.rho[i], G = b.G[i];
         Lanes<Real> p = dot(d0, d1), q = dot(d1, d2);
         Vec3<Real> d12 = cross(d1, d2), d01 = cross(d0, d1), d20 = cross(d2, d0);
-        energy += G * (Real(0.5) * (rho * (1 - p * p) + (1 - q * q) / rho) - C * (p * q - dot(d0, d2)) - S * dot(d0, d12));
+        energy += G * (Real(0.5) * (rho * (1 - p * p) + (1 - q * q) / rho) - C * (p * q - dot(d0, d2)) -
+                       S * dot(d0, d12));
         Lanes<Real> u0 = rho * p + C * q, u2 = q / rho + C * p;
         edges.D[i - 1] = edges.D[i - 1] - G * (u0 * d1 - C * d2 + S * d12);
         edges.D[i] = edges.D[i] - G * (u0 * d0 + u2 * d2 + S * d20);

@@ -49,28 +49,43 @@ struct Followed {
     Lanes<float> weight[kGuidesMax], step[kGuidesMax]; // step: the strand's spacing in spacings of the guide
 };
 
+typedef float Quad __attribute__((vector_size(16)));
+
+/// Sixteen quaternions, one after the other, to a lane each.
+RINGLET_INLINE Rotation transposed(const Quad (&of)[kLanes<float>]) {
+    Lanes<float> part[4];
+    __builtin_memcpy(part, of, sizeof part);
+    const auto split = [](Lanes<float> a, Lanes<float> b, Lanes<float> &wx, Lanes<float> &yz) {
+        wx = __builtin_shufflevector(a, b, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
+        yz = __builtin_shufflevector(a, b, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
+    };
+    const auto first = [](Lanes<float> a, Lanes<float> b) {
+        return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    };
+    const auto second = [](Lanes<float> a, Lanes<float> b) {
+        return __builtin_shufflevector(a, b, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
+    };
+    Lanes<float> wx[2], yz[2];
+    split(part[0], part[1], wx[0], yz[0]);
+    split(part[2], part[3], wx[1], yz[1]);
+    return {first(wx[0], wx[1]), {second(wx[0], wx[1]), first(yz[0], yz[1]), second(yz[0], yz[1])}};
+}
+
 /// A_g where segment j of the strand is, between two segments of the guide; beyond the guide's tip its last one.
 RINGLET_INLINE Rotation rotation_at(const GuideMotion &motion, const Followed &to, int g, int j) {
-    constexpr int W = kLanes<float>;
-    const Lanes<float> u = (j + 0.5f) * to.step[g] - 0.5f;
-    const float *rotations = motion.rotations.data(), last = float(motion.Q - 2);
-    const int *row = to.row[g];
-    float along[W], part[4][W];
-    __builtin_memcpy(along, &u, sizeof u);
-#pragma omp simd
-    for (int lane = 0; lane < W; ++lane) {
-        const float v = along[lane] > 0 ? (along[lane] < last ? along[lane] : last) : 0.0f;
-        const int i = int(v) < motion.Q - 3 ? int(v) : motion.Q - 3;
-        const float f = v - i;
-        const float *a = rotations + 4 * (row[lane] + i);
-        for (int c = 0; c < 4; ++c) part[c][lane] = a[c] + f * (a[c + 4] - a[c]);
+    const Lanes<float> last = splat(float(motion.Q - 2)), u = (j + 0.5f) * to.step[g] - 0.5f;
+    const Lanes<float> v = minimum<float>(u > 0 ? u : Lanes<float>{}, last);
+    const Mask<float> i = __builtin_convertvector(minimum<float>(v, last - 1), Mask<float>);
+    const Lanes<float> f = v - __builtin_convertvector(i, Lanes<float>);
+    Quad at[kLanes<float>];
+    for (int lane = 0; lane < kLanes<float>; ++lane) {
+        Quad here, next;
+        const float *from = motion.rotations.data() + 4 * (to.row[g][lane] + i[lane]);
+        __builtin_memcpy(&here, from, sizeof here);
+        __builtin_memcpy(&next, from + 4, sizeof next);
+        at[lane] = here + f[lane] * (next - here);
     }
-    Rotation r;
-    __builtin_memcpy(&r.w, part[0], sizeof u);
-    __builtin_memcpy(&r.u.x, part[1], sizeof u);
-    __builtin_memcpy(&r.u.y, part[2], sizeof u);
-    __builtin_memcpy(&r.u.z, part[3], sizeof u);
-    return r;
+    return transposed(at);
 }
 
 /// R_j, a multiple of it. A guide whose rotation differs from the nearest one's by more than 60 degrees has parted
@@ -114,15 +129,18 @@ class Skin {
             Vec3<float> gradient;
             sample<float>(field_, x + t, phi, gradient);
             bound_ = near ? phi : bound_;
-            near &= phi < keep;
-            t = select(near, tilted(t, whole, gradient, keep - phi), t);
+            const Lanes<float> depth = keep - phi;
+            near &= depth > 0;
+            t = select(near, tilted(t, whole, gradient, depth), t);
+            near &= depth > kCurved;
         }
         return t;
     }
 
   private:
     static constexpr float kRise = 0.25f;
-    static constexpr int kRounds = 4; // exact in one round over a plane
+    static constexpr int kRounds = 4;          // one is exact over a plane
+    static constexpr float kCurved = 0.5e-3f;  // [m]: from less depth one is exact to 0.01 mm over any head
 
     /// The segment whose end is higher by `rise`, turned in the plane of itself and the normal; upright at most.
     static RINGLET_INLINE Vec3<float> tilted(Vec3<float> t, Lanes<float> whole, Vec3<float> gradient, Lanes<float> rise) {

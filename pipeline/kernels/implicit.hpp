@@ -16,11 +16,14 @@
 namespace ringlet {
 
 /// Stretch stiffness k_s of segment j over m0. Stiffer than the tension, or a loaded strand goes unstable.
-template <class Real> RINGLET_INLINE Lanes<Real> stretch_stiffness(const Block<Real> &b, Lanes<Real> T, int j, Real dt) {
+template <class Real>
+RINGLET_INLINE Lanes<Real> stretch_stiffness(const Block<Real> &b, Lanes<Real> T, int j, Real dt) {
     return maximum<Real>(splat(Real(1e3) / (dt * dt)), 10 * T / (b.l[j] * b.m0));
 }
 
-template <class Real> RINGLET_INLINE void outer(Vec3<Real> a, Lanes<Real> (&block)[6], Lanes<Real> w, Lanes<Real> diagonal) {
+/// w a a^T + diagonal I, as the 6 entries of a symmetric block.
+template <class Real>
+RINGLET_INLINE void outer(Vec3<Real> a, Lanes<Real> (&block)[6], Lanes<Real> w, Lanes<Real> diagonal) {
     block[0] = w * a.x * a.x + diagonal, block[1] = w * a.x * a.y, block[2] = w * a.x * a.z;
     block[3] = w * a.y * a.y + diagonal, block[4] = w * a.y * a.z, block[5] = w * a.z * a.z + diagonal;
 }
@@ -50,7 +53,7 @@ void add_bending_stiffness(const Block<Real> &b, const Edges<Real> &edges, Lanes
     }
 }
 
-/// Two unit vectors that make an orthonormal basis with d (Duff et al. 2017, "Building an orthonormal basis, revisited").
+/// Two unit vectors that make an orthonormal basis with d ("Building an orthonormal basis, revisited", Duff et al. 2017).
 template <class Real> RINGLET_INLINE void complete_basis(Vec3<Real> d, Vec3<Real> (&m)[2]) {
     Lanes<Real> sign = d.z >= 0 ? splat(Real(1)) : splat(Real(-1));
     Lanes<Real> a = -1 / (sign + d.z), xy = d.x * d.y * a;
@@ -95,8 +98,8 @@ void add_frenet_stiffness(const Block<Real> &b, const Edges<Real> &edges, Lanes<
 }
 
 template <class Real, int Band>
-void add_stretch_stiffness(const Block<Real> &b, const Edges<Real> &edges, const Lanes<Real> *T, Lanes<Real> scale, Real dt,
-                           Banded<Real, Band> &A) {
+void add_stretch_stiffness(const Block<Real> &b, const Edges<Real> &edges, const Lanes<Real> *T, Lanes<Real> scale,
+                           Real dt, Banded<Real, Band> &A) {
     for (int j = 0; j < b.P - 1; ++j) {
         Lanes<Real> block[6], tight = maximum<Real>(T[j], splat(Real(0))) * edges.il[j] / b.m0;
         outer(edges.d[j], block, stretch_stiffness(b, T[j], j, dt) - tight, tight);
@@ -140,25 +143,36 @@ void internal_forces(const Block<Real> &b, const StepSettings &settings, const L
     f[b.P - 1] = per_mass * f[b.P - 1];
 }
 
+/// What one solve reads.
+template <class Real> struct Equation {
+    const Block<Real> &b;
+    const Motion<Real> &from;
+    const Interval<Real> &step;
+    const StepSettings &settings;
+    const Contacts<Real> &contacts;
+    const Edges<Real> &edges;
+    const Vec3<Real> *f; // internal forces over m0
+};
+
 /// Masses, drag, rows of contacts on the diagonal, and the right side.
-template <class Real, int Band>
-void add_points(const Block<Real> &b, const Motion<Real> &from, const Interval<Real> &step, const StepSettings &settings,
-                const Vec3<Real> *f, const Contacts<Real> &contacts, Banded<Real, Band> &A) {
-    const Real dt = Real(step.dt), theta = Real(settings.theta), theta_dt = theta * dt;
+template <class Real, int Band> void add_points(const Equation<Real> &eq, Banded<Real, Band> &A) {
+    const Block<Real> &b = eq.b;
+    const Real dt = Real(eq.step.dt), theta = Real(eq.settings.theta), theta_dt = theta * dt;
     const Lanes<Real> one = splat(Real(1));
     for (int i = b.first; i < b.P; ++i) {
-        Drag<Real> drag(b, from, i, settings, step.wind);
+        const Vec3<Real> v = eq.from.v[i];
+        Drag<Real> drag(b, eq.from, i, eq.settings, eq.step.wind);
         Lanes<Real> block[6];
         outer(drag.t, block, theta_dt * (drag.c_par - drag.c_perp), 1 + theta_dt * drag.c_perp);
         A.add_block(i, i, b.mu[i], block);
-        A.add_right(i, b.mu[i] * from.v[i] + splat(theta_dt) * (f[i] + b.mu[i] * (step.gravity + drag.push)));
-        if (!contacts.any_row || !any<Real>(contacts.row[i] > 0)) continue;
-        // theta k dt^2 n n^T with k = 1e3 / dt^2, and its right side
-        Lanes<Real> k = (theta * Real(kRow)) * contacts.row[i];
-        const Vec3<Real> n = contacts.n[i];
+        A.add_right(i, b.mu[i] * v + splat(theta_dt) * (eq.f[i] + b.mu[i] * (eq.step.gravity + drag.push)));
+        if (!eq.contacts.any_row || !any<Real>(eq.contacts.row[i] > 0)) continue;
+        // A contact's row: theta k dt^2 n n^T with k = 1e3 / dt^2, and its right side
+        const Vec3<Real> n = eq.contacts.n[i];
+        Lanes<Real> k = (theta * Real(kRow)) * eq.contacts.row[i];
         outer(n, block, k, splat(Real(0)));
         A.add_block(i, i, one, block);
-        A.add_right(i, (k * (dot(n, from.v[i]) - contacts.gap[i] / dt)) * n);
+        A.add_right(i, (k * (dot(n, v) - eq.contacts.gap[i] / dt)) * n);
     }
 }
 
@@ -175,26 +189,27 @@ void hold(const Block<Real> &b, const Vec3<Real> *u, Banded<Real, Band> &A) {
         if (any<Real>(b.free[i] < 1)) A.eliminate(i, 1 - b.free[i], u[i]);
 }
 
-/// Solves for u (held points know theirs) and predicts the tensions from the stretch.
+/// Solves for u (held points know theirs) and predicts the tensions T from the stretch.
 template <class Real, int Band>
-void solve_velocities(const Block<Real> &b, const Motion<Real> &from, const Interval<Real> &step,
-                      const StepSettings &settings, const Contacts<Real> &contacts, const Edges<Real> &edges,
-                      const Vec3<Real> *f, Banded<Real, Band> &A, Vec3<Real> *u, Lanes<Real> *T) {
-    const Real dt = Real(step.dt), theta_dt = Real(settings.theta) * dt;
-    const Lanes<Real> scale = splat(theta_dt * (theta_dt + Real(settings.damping))) / b.m0;
+void solve_velocities(const Equation<Real> &eq, Banded<Real, Band> &A, Vec3<Real> *u, Lanes<Real> *T) {
+    const Block<Real> &b = eq.b;
+    const Real dt = Real(eq.step.dt), theta_dt = Real(eq.settings.theta) * dt;
+    const Lanes<Real> scale = splat(theta_dt * (theta_dt + Real(eq.settings.damping))) / b.m0;
     A.clear();
-    add_bending_stiffness(b, edges, scale, A);
+    add_bending_stiffness(b, eq.edges, scale, A);
     if constexpr (Band >= 15) {
-        if (settings.torsion == Torsion::frenet) add_frenet_stiffness(b, edges, scale, A);
+        if (eq.settings.torsion == Torsion::frenet) add_frenet_stiffness(b, eq.edges, scale, A);
     }
-    if (settings.torsion == Torsion::rotor) add_rotor_stiffness(b, edges, scale, A);
-    add_stretch_stiffness(b, edges, from.T, scale, dt, A);
-    add_points(b, from, step, settings, f, contacts, A);
+    if (eq.settings.torsion == Torsion::rotor) add_rotor_stiffness(b, eq.edges, scale, A);
+    add_stretch_stiffness(b, eq.edges, eq.from.T, scale, dt, A);
+    add_points(eq, A);
     hold(b, u, A);
     A.solve(3 * b.first);
     for (int i = b.first; i < b.P; ++i) u[i] = {A.right[3 * i], A.right[3 * i + 1], A.right[3 * i + 2]};
-    for (int j = 0; j < b.P - 1; ++j)
-        T[j] = from.T[j] + (stretch_stiffness(b, from.T[j], j, dt) * b.m0 * dt) * dot(edges.d[j], u[j + 1] - u[j]);
+    for (int j = 0; j < b.P - 1; ++j) {
+        Lanes<Real> k_s = stretch_stiffness(b, eq.from.T[j], j, dt) * b.m0;
+        T[j] = eq.from.T[j] + k_s * dt * dot(eq.edges.d[j], u[j + 1] - u[j]);
+    }
 }
 
 } // namespace ringlet

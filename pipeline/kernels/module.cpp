@@ -25,7 +25,9 @@ static void set_threads(int count) {
     thread_count = count;
 }
 
+void bind_density(nb::module_ &m);
 void bind_energy(nb::module_ &m);
+void bind_shade(nb::module_ &m);
 void bind_expand(nb::module_ &m);
 void bind_step(nb::module_ &m);
 
@@ -36,7 +38,9 @@ NB_MODULE(RINGLET_MODULE, m) {
     m.def("set_threads", &ringlet::set_threads, nanobind::arg("count"),
           "Threads of every kernel from now on; 0 is all processors. No result depends on it.");
     m.def("threads", &ringlet::threads, "Threads that kernels use.");
+    ringlet::bind_density(m);
     ringlet::bind_energy(m);
+    ringlet::bind_shade(m);
     ringlet::bind_expand(m);
     ringlet::bind_step(m);
 }

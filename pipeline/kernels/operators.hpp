@@ -1,7 +1,7 @@
 // Curvature and torsion of strands by the two forms of the lecture, as plain operators.
 //
-// Source: KIST lecture "Hair Simulation 2" (Physically Based Animation, 2008). "general" is the form for unequal spacing,
-// "equal" what its "Simplification" slide leaves at equal spacing dl, with e = x_{i+1} - x_{i-1}, c = x_{i+1} - 2 x_i + x_{i-1}:
+// Source: KIST lecture "Hair Simulation 2" (Physically Based Animation, 2008). "general" is for unequal spacing, "equal"
+// what its "Simplification" slide leaves at equal spacing dl, with e = x_{i+1} - x_{i-1}, c = x_{i+1} - 2 x_i + x_{i-1}:
 //     kappa = 2 |c| / (dl |e|),    tau = e.(c x q) / (2 dl |c|^2),    q = c_{i+1}/|e_{i+1}| - c_{i-1}/|e_{i-1}|
 // General: unit edges t- and t+ beside the point, segment lengths h- and h+, dl = (h- + h+)/2,
 //     k = 2 (t+ - t-) / (dl |t+ + t-|),    T = (t+ + t-)/|t+ + t-|,    kappa = |k|

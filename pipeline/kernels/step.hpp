@@ -18,7 +18,7 @@ inline constexpr int kHalvings = 6, kResolves = 2;
 /// What happened, added up over the steps of a block. Per lane where lanes differ.
 template <class Real> struct Tally {
     Lanes<Real> strain{}, depth{};
-    long rounds = 0, solves = 0, halvings = 0, steps = 0;
+    long rounds = 0, solves = 0, halvings = 0;
     int rounds_max = 0;
     double contacts = 0;
 };
@@ -48,7 +48,7 @@ template <class Real> class Stepper {
     }
 
     void step(const Interval<Real> &interval, M wanted) {
-        ++tally.steps;
+        hopeless_ = M{};
         advance(interval, now, next_, wanted, 0);
         std::swap(now, next_);
         if (!field_) return;
@@ -71,11 +71,13 @@ template <class Real> class Stepper {
     Banded<Real, 12> narrow_;
     Banded<Real, 15> wide_;
     Vec3<Real> *f_, *u_, *star_; // forces, velocities of travel, points before the rounds
+    M hopeless_{};               // lanes that failed in the shortest step too: not halved again in this one
 
     /// One step, or two half steps for the lanes in which it fails (contact.md step f).
     void advance(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to, M wanted, int depth) {
         const Tally<Real> before = tally;
-        M failed = attempt(interval, from, to, wanted) & wanted;
+        M failed = attempt(interval, from, to, wanted) & ~hopeless_;
+        if (depth == kHalvings) hopeless_ |= failed;
         if (!any<Real>(failed) || depth == kHalvings) return;
         keep_accepted(before, failed);
         Motion<Real> &middle = halves_[2 * depth], &end = halves_[2 * depth + 1];
@@ -130,11 +132,13 @@ template <class Real> class Stepper {
 
     /// Banded solve; rows that would pull are dropped and the system is solved again.
     void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
+        const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, f_};
         for (int again = 0;; ++again) {
             ++tally.solves;
-            if (wide(settings_)) solve_velocities(block, from, interval, settings_, contacts, edges_, f_, wide_, u_, to.T);
-            else solve_velocities(block, from, interval, settings_, contacts, edges_, f_, narrow_, u_, to.T);
-            if (!contacts.any_row || !contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) return;
+            if (wide(settings_)) solve_velocities(equation, wide_, u_, to.T);
+            else solve_velocities(equation, narrow_, u_, to.T);
+            if (!contacts.any_row) return;
+            if (!contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) return;
         }
     }
 
@@ -143,7 +147,8 @@ template <class Real> class Stepper {
         const L dt = splat(Real(interval.dt));
         for (int i = block.first; i < block.P; ++i) {
             Drag<Real> drag(block, from, i, settings_, interval.wind);
-            Vec3<Real> v = from.v[i], slowing = drag.c_perp * v + ((drag.c_par - drag.c_perp) * dot(v, drag.t)) * drag.t;
+            Vec3<Real> v = from.v[i];
+            Vec3<Real> slowing = drag.c_perp * v + ((drag.c_par - drag.c_perp) * dot(v, drag.t)) * drag.t;
             Vec3<Real> a = (1 / block.mu[i]) * f_[i] + interval.gravity + drag.push - slowing;
             u_[i] = select(block.free[i] > 0, v + dt * a, u_[i]);
             contacts.row[i] = L{};

@@ -43,7 +43,7 @@ def rest_shape(
     Raises ValueError when points are not finite or a segment has no length.
     """
     count = len(points)
-    return kernels.rest_shape(
+    rest = kernels.rest_shape(
         np.ascontiguousarray(points, np.float64),
         np.full(count, mass_per_length(hair)),
         np.full(count, bending_stiffness(hair)),
@@ -51,6 +51,11 @@ def rest_shape(
         held_points(pins, points.shape[1]),
         np.ascontiguousarray(offset, np.float64),
     )
+    # Nearly straight joints have any torsion ("frenet" divides by their bend); half a turn a segment is the most
+    # that a strand can show, and what would act once it bends.
+    half_turn = np.pi / rest.length.mean(axis=1, keepdims=True)
+    rest.torsion = np.clip(rest.torsion, -half_turn, half_turn)
+    return rest
 
 
 def step_settings(simulate: Simulate) -> kernels.StepSettings:

@@ -18,7 +18,7 @@ from pipeline.simulate.wind import wind
 Arrays = dict[str, NDArray[Any]]
 
 _ENERGIES = ("bending", "torsion", "kinetic", "gravity")
-_BLOWN_UP = 2.0  # times its length away from its root
+_TORN = 0.5  # strain of a segment that no relaxation brings back
 
 
 class SimulationDiverged(InputError):
@@ -119,9 +119,10 @@ class Simulation:
         self.check()
 
     def check(self) -> None:
-        """Raise SimulationDiverged when a guide is not finite or reaches further than twice its length."""
-        reach = np.linalg.norm(self.state.points - self.state.points[:, :1], axis=2).max(axis=1)
-        diverged = ~(reach < _BLOWN_UP * self.rest.length.sum(axis=1))  # nan compares false
+        """Raise SimulationDiverged when a guide is not finite or torn."""
+        segments = np.linalg.norm(np.diff(self.state.points, axis=1), axis=2)
+        strain = np.abs(segments / self.rest.length - 1).max(axis=1)
+        diverged = ~(strain < _TORN)  # nan compares false
         if diverged.any():
             raise SimulationDiverged(int(np.argmax(diverged)), 1 - (-self.step // self.simulate.substeps))
 

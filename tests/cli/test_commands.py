@@ -209,6 +209,13 @@ def test_wrong_input_is_one_message_and_exit_code_2(ringlet: Ringlet, tmp_path: 
     assert "no such file" in ringlet.capsys.readouterr().err
 
 
+def test_outputs_that_cannot_be_written_are_told(ringlet: Ringlet) -> None:
+    ringlet.outputs.write_text("a file, no folder")
+    _, err = ringlet("run", code=2)
+    assert "outputs" in err
+    assert "Not a directory" in err
+
+
 def test_a_full_disk_ends_a_run_with_one_message_and_nothing_lost(tmp_path: Path) -> None:
     config = tmp_path / "x.toml"
     config.write_text(CONFIG)

@@ -23,9 +23,17 @@ mkdir -p "$build/tree"
 (cd "$root" && find pipeline -name '*.py' -exec cp --parents {} "$build/tree" \;)
 cp "$build/objects"/_portable*.so "$build/tree/pipeline/kernels/"
 
-# Python itself leaks on purpose; libasan must come before every other library
+# Python itself leaks on purpose; libasan must come before every other library, and finds __cxa_throw in libstdc++
 cd "$build/tree"
-export LD_PRELOAD="$(${CXX:-g++} -print-file-name=libasan.so)"
+export LD_PRELOAD="$(${CXX:-g++} -print-file-name=libasan.so) $(${CXX:-g++} -print-file-name=libstdc++.so)"
 export ASAN_OPTIONS=detect_leaks=0:abort_on_error=1 UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
 export RINGLET_KERNELS=portable OMP_NUM_THREADS=2
-exec "$python" -m pytest "$root/tests/kernels" --rootdir "$root" -c "$root/pyproject.toml" -p no:cacheprovider "$@"
+exec "$python" -c '
+import sys
+import pytest
+
+# The copy, not an editable install of the working tree
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
+sys.path.insert(0, sys.argv[1])
+sys.exit(pytest.main(sys.argv[2:]))
+' "$build/tree" "$root/tests/kernels" --rootdir "$root" -c "$root/pyproject.toml" -p no:cacheprovider "$@"

@@ -286,8 +286,7 @@ def test_rotated_scene_gives_the_rotated_motion(curl: Points) -> None:
 
 
 def test_bad_numbers_are_reported_and_stay_in_their_strand(curl: Points) -> None:
-    points = np.repeat(curl[None], 12, axis=0)
-    rest, state = shape(points), kernels.at_rest(points)
+    rest, state = curly_head(12, np.float64)
     clean = copy(state)
     state.points[9, 12, 1] = np.nan
     report = kernels.advance(state, rest, sphere(), drive(24), settings())

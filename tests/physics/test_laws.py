@@ -12,7 +12,9 @@ from pipeline.validation.rod import period
 @pytest.mark.parametrize("case", all_cases(), ids=lambda case: f"{case.name}, {case.model}")
 def test_strands_obey_the_law_of(case: Case) -> None:
     result = case.run()
-    print(f"{result.measured:.6g} against {result.reference:.6g}: {result.error:.1e} of {result.tolerance:.1e}")
+    print(
+        f"{result.measured:.6g} against {result.reference:.6g}: {result.error:.1e} of {result.tolerance:.1e}"
+    )
     assert result.passed
 
 

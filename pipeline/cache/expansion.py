@@ -1,0 +1,35 @@
+"""The expansion that an experiment's caches describe, for whoever draws or exports its strands."""
+
+import numpy as np
+
+from pipeline import kernels
+from pipeline.cache.store import Reader
+from pipeline.config import Config
+from pipeline.strands.expand import Binding, Expansion, Style
+
+
+def expansion_from(groom: Reader, strands: Reader, config: Config) -> Expansion:
+    """All strands of strands.h5 at rest on the groom of groom.h5; raises Damaged.
+
+    Holds the rest shapes that some strand takes and the binding: 12 P bytes for each groom strand and about 60
+    for each strand.
+    """
+    columns = ("parent", "root", "guide", "weight", "key", "scale", "phase")
+    binding = Binding(**{name: strands[f"strands/{name}"][:] for name in columns})
+    shapes = int(binding.parent.max()) + 1 if len(binding) else 0
+    options = config.interpolate
+    return Expansion(
+        rest=groom["strands/points"][:shapes],
+        guide_rest=groom["strands/points"][groom["guides/strand"][:]],
+        binding=binding,
+        field=distance_field(groom),
+        style=Style(options.skin, options.variation.clump, options.variation.frizz),
+    )
+
+
+def distance_field(groom: Reader) -> kernels.DistanceField | None:
+    """Distance to the head of groom.h5, in its rest frame; None where there is no head."""
+    if "head/distance" not in groom:
+        return None
+    values, origin = groom["head/distance"][:], groom["head/origin"][:]
+    return kernels.DistanceField(values, np.asarray(origin, np.float64), float(groom["head/spacing"][0]))

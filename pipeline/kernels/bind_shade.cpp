@@ -1,0 +1,134 @@
+// Python's view of fibre tables, lights and shading.
+#include "bindings.hpp"
+
+#include "shade.hpp"
+#include "surface.hpp"
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
+
+#include <cmath>
+#include <optional>
+#include <tuple>
+
+namespace ringlet {
+
+using Triples = Array<const float, -1, 3>;
+using Triple = Array<const float, 3>;
+using Point = Array<const double, 3>;
+using Depth = Array<const float, -1, -1, -1, -1>;
+using Records = Array<const float, -1, -1, -1, 8>;
+using Strands = Array<const float, -1, -1, 3>;
+using Radiance = nb::ndarray<nb::numpy, float>;
+
+/// The tables with the arrays that they point into.
+struct HeldTables : FibreTables {
+    Records lobe_array;
+    Array<const float, -1, -1, 8> sum_array;
+};
+
+static void make_tables(HeldTables *held, Records lobes, Array<const float, -1, -1, 8> sums, Array<const float, 4> variance,
+                        Array<const float, 4> tilt, float absorption_max) {
+    for (int axis = 0; axis < 3; ++axis) require(lobes.shape(axis) >= 2, "FibreTables: expected 2 or more entries along each axis");
+    require(sums.shape(0) == lobes.shape(0) && sums.shape(1) == lobes.shape(1), "FibreTables: sums do not fit lobes");
+    require(absorption_max > 0, "FibreTables: expected a positive absorption_max");
+    FibreTables tables{};
+    tables.lobes = lobes.data(), tables.sums = sums.data(), tables.absorption_max = absorption_max;
+    tables.A = int(lobes.shape(0)), tables.T = int(lobes.shape(1)), tables.H = int(lobes.shape(2));
+    for (int p = 0; p < 4; ++p) {
+        require(variance.data()[p] > 0, "FibreTables: expected positive variances");
+        tables.variance[p] = variance.data()[p];
+        tables.tilt_cosine[p] = std::cos(tilt.data()[p]), tables.tilt_sine[p] = std::sin(tilt.data()[p]);
+    }
+    new (held) HeldTables{tables, lobes, sums};
+}
+
+/// The light with the arrays that it points into.
+struct HeldLight : Illumination {
+    Triples direction_array, irradiance_array;
+    Triple sky_array;
+    std::tuple<Depth, Depth, Depth> depth_arrays;
+    Records surrounding_array;
+};
+
+static void make_light(HeldLight *held, Triples directions, Triples irradiance, Triple sky,
+                       std::tuple<Depth, Depth, Depth> depths, Records surroundings) {
+    const auto &[towards, away, body] = depths;
+    Illumination light{};
+    light.lights = int(directions.shape(0));
+    require(irradiance.shape(0) == directions.shape(0), "Illumination: irradiance does not fit directions");
+    for (const Depth *depth : {&towards, &away, &body}) {
+        require(depth->shape(0) == directions.shape(0), "Illumination: depths do not fit directions");
+        for (int axis = 1; axis < 4; ++axis)
+            require(depth->shape(axis) == towards.shape(axis), "Illumination: depths differ in shape");
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        light.n[axis] = int(towards.shape(axis + 1));
+        require(light.n[axis] >= 4 && size_t(light.n[axis] / 2) == surroundings.shape(axis),
+                "Illumination: surroundings are not half of depths");
+    }
+    require(towards.shape(1) * towards.shape(2) * towards.shape(3) < size_t(1) << 31, "Illumination: expected fewer than 2^31 voxels");
+    light.directions = directions.data(), light.irradiance = irradiance.data(), light.sky = sky.data();
+    light.towards = towards.data(), light.away = away.data(), light.body = body.data();
+    light.surroundings = surroundings.data();
+    new (held) HeldLight{light, directions, irradiance, sky, depths, surroundings};
+}
+
+static Radiance shade_strands(Strands points, Triples absorption, Array<const uint32_t, -1> key, Point eye,
+                              const HeldLight &light, const HeldTables &tables) {
+    const size_t S = points.shape(0), P = points.shape(1);
+    require(P >= 2, "shade: expected 2 or more points");
+    require(absorption.shape(0) == S && key.shape(0) == S, "shade: absorption and key do not fit points");
+    auto radiance = new_array<float>({S, P, size_t(3)});
+    const double *e = eye.data();
+    const StrandPoints strands{points.data(), absorption.data(), key.data(), int(P), {e[0], e[1], e[2]}};
+    float *out = radiance.data();
+    nb::gil_scoped_release release;
+    shade(strands, S * P, light, tables, out, threads());
+    return radiance;
+}
+
+/// The surface with the arrays that it points into.
+struct HeldSurface {
+    Triples points, normals, albedo;
+};
+
+static void make_surface(HeldSurface *held, Triples points, Triples normals, Triples albedo) {
+    require(normals.shape(0) == points.shape(0) && albedo.shape(0) == points.shape(0),
+            "Surface: points, normals and albedo differ in shape");
+    new (held) HeldSurface{points, normals, albedo};
+}
+
+static Radiance shade_head(const HeldSurface &surface, Point eye, const HeldLight &light, const DistanceField *field,
+                           Array<const double, 4, 4> pose, Triple loss) {
+    const size_t N = surface.points.shape(0);
+    auto radiance = new_array<float>({N, size_t(3)});
+    const double *e = eye.data();
+    const SurfacePoints points{surface.points.data(), surface.normals.data(), surface.albedo.data(), {e[0], e[1], e[2]}};
+    const Occluder head{field, Rigid<float>(Pose::of(pose.data()).inverse())};
+    float *out = radiance.data();
+    nb::gil_scoped_release release;
+    shade_surface(points, N, light, head, loss.data(), out, threads());
+    return radiance;
+}
+
+void bind_shade(nb::module_ &m) {
+    nb::class_<HeldTables>(m, "FibreTables")
+        .def("__init__", &make_tables, nb::arg("lobes"), nb::arg("sums"), nb::arg("variance"), nb::arg("tilt"),
+             nb::arg("absorption_max"));
+    nb::class_<HeldLight>(m, "Illumination")
+        .def("__init__", &make_light, nb::arg("directions"), nb::arg("irradiance"), nb::arg("sky"), nb::arg("depths"),
+             nb::arg("surroundings"))
+        .def_rw("origin", &HeldLight::origin)
+        .def_rw("spacing", &HeldLight::spacing)
+        .def_rw("glints", &HeldLight::glints);
+    nb::class_<HeldSurface>(m, "Surface")
+        .def("__init__", &make_surface, nb::arg("points"), nb::arg("normals"), nb::arg("albedo"));
+    m.def("shade", &shade_strands, nb::arg("points"), nb::arg("absorption"), nb::arg("key"), nb::arg("eye"),
+          nb::arg("light"), nb::arg("tables"));
+    m.def("shade_surface", &shade_head, nb::arg("surface"), nb::arg("eye"), nb::arg("light"), nb::arg("field").none(),
+          nb::arg("pose"), nb::arg("loss"));
+}
+
+} // namespace ringlet

@@ -1,0 +1,189 @@
+// Radiance of strands towards the eye, 16 points side by side.
+//
+// With n fibres on the way to the light (the mean of a Poisson count) and n_b behind the point, per channel,
+//
+//     L = E V { e^-n sum M N + (I - e^-n) sum M(v + v_I) G(phi) + q c J sum M(v + v_J) G(pi - phi) } + environment,
+//
+// where I and J are the light that goes down and comes back in a two-flux layer of fibres with forward and backward
+// albedo a_f and a_b: g = 1 - a_f, k^2 = g^2 - a_b^2, T = n + n_b,
+//
+//     I = [(k+g) e^-kn + (k-g) e^-k(2T-n)] / den,  J = a_b [e^-kn - e^-k(2T-n)] / den,  den = (k+g) + (k-g) e^-2kT.
+//
+// Ours; a variant of Zinke et al., Dual Scattering Approximation for Fast Multiple Scattering in Hair, SIGGRAPH 2008,
+// which counts hits along the ray and truncates the layer's series. q = pi/2 turns flux into radiance, c = max(0.2, N.L).
+#pragma once
+
+#include "illumination.hpp"
+
+namespace ringlet {
+
+struct StrandPoints {
+    const float *points;     // (S, P, 3)
+    const float *absorption; // (S, 3)
+    const uint32_t *key;     // (S,)
+    int P;
+    double eye[3];
+};
+
+/// 16 points of strands, and what does not depend on the light.
+struct FibrePoints {
+    Vec3<float> x, tangent, to_eye; // x in voxels
+    Floats sine, cosine, theta;     // of theta_o
+    Floats level[3];                // absorption in entries of the tables
+    Floats albedo[3];               // a_f + a_b across the fibre
+    Words point, patch;             // hashes: of the point, of 4 mm of its strand
+};
+
+constexpr float kPi = 3.14159265f;
+constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
+
+/// Reads the points from `first` on; past the last, the last again.
+inline FibrePoints gather(const StrandPoints &strands, size_t first, size_t count, const Illumination &light) {
+    float position[3][16], tangent[3][16], sigma[3][16];
+    uint32_t point[16], patch[16];
+    for (int i = 0; i < 16; ++i) {
+        const size_t index = std::min(first + i, count - 1), s = index / strands.P;
+        const int j = int(index - s * strands.P);
+        const float *at = strands.points + 3 * index, *root = at - 3 * j;
+        const float *before = j > 0 ? at - 3 : at, *after = j + 1 < strands.P ? at + 3 : at;
+        float spacing = 0;
+        for (int c = 0; c < 3; ++c) {
+            position[c][i] = at[c];
+            tangent[c][i] = after[c] - before[c];
+            sigma[c][i] = strands.absorption[3 * s + c];
+            spacing += (root[3 + c] - root[c]) * (root[3 + c] - root[c]);
+        }
+        const uint32_t key = mix(strands.key[s]);
+        // The first segment is held, so its length is the same in every frame and patches do not crawl
+        const float patches = std::min(j * std::sqrt(spacing) / kPatch + float(key >> 8) * 0x1p-24f, 1e6f);
+        point[i] = mix(key + uint32_t(j));
+        patch[i] = mix(key ^ mix(uint32_t(patches)));
+    }
+    FibrePoints p;
+    Vec3<float> x;
+    __builtin_memcpy(&x, position, sizeof x);
+    __builtin_memcpy(&p.tangent, tangent, sizeof p.tangent);
+    __builtin_memcpy(p.level, sigma, sizeof sigma);
+    __builtin_memcpy(&p.point, point, sizeof point);
+    __builtin_memcpy(&p.patch, patch, sizeof patch);
+    const auto unit = [](Vec3<float> a) { return (1.0f / square_root<float>(dot(a, a) + 1e-30f)) * a; };
+    p.tangent = unit(p.tangent);
+    p.to_eye = unit({float(strands.eye[0]) - x.x, float(strands.eye[1]) - x.y, float(strands.eye[2]) - x.z});
+    p.x = in_voxels(light, x);
+    p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
+    p.cosine = square_root<float>(maximum<float>(1.0f - p.sine * p.sine, splat(1e-6f)));
+    p.theta = 0.5f * kPi - arc_cosine(p.sine);
+    return p;
+}
+
+/// Forward, backward and twice scattered light in one channel.
+struct Flux {
+    Floats down, back; // I with the direct light, J
+};
+
+RINGLET_INLINE Flux two_flux(Floats a_f, Floats a_b, Floats n, Floats behind) {
+    const Floats g = 1.0f - a_f, k = square_root<float>(maximum<float>(g * g - a_b * a_b, splat(1e-6f)));
+    const Floats there = exponential(-k * n), behind_twice = exponential(-2.0f * k * behind);
+    const Floats returned = there * behind_twice; // e^-k(2T-n)
+    const Floats scale = 1.0f / ((k + g) + (k - g) * there * returned);
+    return {((k + g) * there + (k - g) * returned) * scale, a_b * (there - returned) * scale};
+}
+
+/// M of the lobes R, TT and TRT + rest, widened by the light's spread.
+RINGLET_INLINE void widened(const FibreTables &tables, Floats spread, Floats cosines, Floats sines, Floats M[3]) {
+    for (int p = 0; p < 3; ++p) M[p] = along(cosines, sines, Lobe(tables.variance[p] + spread));
+}
+
+/// Fibres on the way to a light and behind, and how much the body lets through.
+struct Reach {
+    Floats n, behind, visible;
+};
+
+/// The strand itself is in the grid: half a voxel towards the light leaves it behind. The jitter breaks up the grid.
+RINGLET_INLINE Reach reach(const FibrePoints &p, const Illumination &light, int l) {
+    const Floats step = 0.25f + 0.5f * uniform(mix(p.point + uint32_t(l)));
+    const Floats n = trilinear(light.depth(light.towards, l), p.x + step * light.direction(l));
+    return {n, trilinear(light.depth(light.away, l), p.x), exponential(-trilinear(light.depth(light.body, l), p.x))};
+}
+
+/// What one light adds. noinline: the compiler keeps the 16 lanes in registers only in functions of this size.
+__attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illumination &light, int l,
+                                                const FibreTables &tables, const Vec3<float> &normal, Floats radiance[3]) {
+    const Vec3<float> L = light.direction(l);
+    const Reach way = reach(p, light, l);
+
+    // Angles of the fibre's frame
+    const Floats sine = clamp(dot(p.tangent, L), -1, 1);
+    const Floats cosine = square_root<float>(maximum<float>(1.0f - sine * sine, splat(1e-6f)));
+    const Floats difference = p.theta - (0.5f * kPi - arc_cosine(sine));
+    const Floats phi = arc_cosine((dot(p.to_eye, L) - p.sine * sine) / (p.cosine * cosine));
+    const Place theta((difference < 0.0f ? -difference : difference) * ((tables.T - 1) / kPi), tables.T);
+    const Place azimuth(phi * ((tables.H - 1) / kPi), tables.H);
+
+    // Spread of light that went through n fibres, from the green channel
+    Floats lobes[8], sums[3][8];
+    for (int c = 0; c < 3; ++c) read_sums(tables, Place(p.level[c], tables.A), theta, sums[c]);
+    const Floats a_f = sums[1][0], a_b = sums[1][1], g = 1.0f - a_f;
+    const Floats hits = way.n * a_f / (1.0f - exponential(-way.n * a_f) + 1e-6f);
+    const Floats loss = square_root<float>(maximum<float>(g * g - a_b * a_b, splat(1e-6f)));
+    const Floats cosines = cosine * p.cosine, sines = sine * p.sine;
+    Floats direct[4], down[3], back[3];
+    widened(tables, minimum<float>(hits * sums[1][5], splat(2.0f)), cosines, sines, down);
+    widened(tables, minimum<float>(sums[1][6] + 2.0f * sums[1][5] / (g + loss), splat(2.0f)), cosines, sines, back);
+
+    // The direct lobes, turned by the cuticle's scales
+    for (int q = 0; q < 4; ++q) {
+        const float ct = tables.tilt_cosine[q], st = tables.tilt_sine[q];
+        const Floats turned = p.cosine * ct - p.sine * st;
+        direct[q] = along(cosine * (turned < 0.0f ? -turned : turned), sine * (p.sine * ct + p.cosine * st),
+                          Lobe(splat(tables.variance[q])));
+    }
+
+    const Floats through = exponential(-way.n);
+    const Words glint = mix(p.patch + 0x9e3779b9u * uint32_t(l + 1));
+    const Floats seen = light.glints ? (uniform(glint) < through ? splat(1.0f) : splat(0.0f)) : through;
+    const Floats facing = (0.5f * kPi) * maximum<float>(dot(normal, L), splat(0.2f));
+    for (int c = 0; c < 3; ++c) {
+        read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
+        const Flux flux = two_flux(sums[c][0], sums[c][1], way.n, way.behind);
+        const Floats scattered = flux.down - through, returned = flux.back * facing;
+        Floats sum = seen * (direct[0] * lobes[0] + direct[1] * lobes[1] + direct[2] * lobes[2] + direct[3] * lobes[3]);
+        // G(pi - phi) = 2 mean - G(phi): the half circles complete each other
+        for (int q = 0; q < 3; ++q)
+            sum += scattered * down[q] * lobes[4 + q] + returned * back[q] * (2.0f * sums[c][2 + q] - lobes[4 + q]);
+        radiance[c] += light.irradiance[3 * l + c] * way.visible * sum;
+    }
+}
+
+/// Absorption in entries of the tables, and the albedo of each channel.
+inline void read_colour(const FibreTables &tables, FibrePoints &p) {
+    const float scale = (tables.A - 1) / std::sqrt(tables.absorption_max);
+    for (int c = 0; c < 3; ++c) {
+        p.level[c] = square_root<float>(maximum<float>(p.level[c], splat(0.0f))) * scale;
+        Floats sums[8];
+        read_sums(tables, Place(p.level[c], tables.A), Place(splat(0.0f), tables.T), sums);
+        p.albedo[c] = sums[0] + sums[1];
+    }
+}
+
+/// Fills `radiance` (S, P, 3) of S * P = count points.
+inline void shade(const StrandPoints &strands, size_t count, const Illumination &light, const FibreTables &tables,
+                  float *radiance, int threads) {
+    const ptrdiff_t blocks = ptrdiff_t((count + 15) / 16);
+#pragma omp parallel for schedule(dynamic, 64) num_threads(threads)
+    for (ptrdiff_t block = 0; block < blocks; ++block) {
+        const size_t first = 16 * size_t(block);
+        FibrePoints p = gather(strands, first, count, light);
+        read_colour(tables, p);
+        Floats around[8], sum[3];
+        read_surroundings(light, p.x, around);
+        const Vec3<float> out{around[4], around[5], around[6]};
+        const Vec3<float> normal = (1.0f / square_root<float>(dot(out, out) + 1e-20f)) * out;
+        for (int c = 0; c < 3; ++c) sum[c] = light.sky[c] * p.albedo[c] * around[c];
+        for (int l = 0; l < light.lights; ++l) add_light(p, light, l, tables, normal, sum);
+        for (size_t i = 0; i < 16 && first + i < count; ++i)
+            for (int c = 0; c < 3; ++c) radiance[3 * (first + i) + c] = sum[c][i];
+    }
+}
+
+} // namespace ringlet

@@ -1,0 +1,122 @@
+// Radiance of the head's surface towards the eye: Lambert and a soft sheen, in the shadow of hair and of itself.
+#pragma once
+
+#include "distance_field.hpp"
+#include "illumination.hpp"
+#include "pose.hpp"
+
+#include <optional>
+
+namespace ringlet {
+
+struct SurfacePoints {
+    const float *points, *normals, *albedo; // (N, 3) world [m], unit, linear R, G, B
+    double eye[3];
+};
+
+/// The head that shadows itself.
+struct Occluder {
+    const DistanceField *field; // may be null
+    Rigid<float> to_rest;
+};
+
+/// 16 points of the surface.
+struct SkinPoints {
+    Vec3<float> x, normal, to_eye, albedo;
+};
+
+inline Vec3<float> read16(const float *values, size_t first, size_t count) {
+    float lanes[3][16];
+    for (int i = 0; i < 16; ++i)
+        for (int c = 0; c < 3; ++c) lanes[c][i] = values[3 * std::min(first + i, count - 1) + c];
+    Vec3<float> r;
+    __builtin_memcpy(&r, lanes, sizeof r);
+    return r;
+}
+
+/// Part of the light that the head lets past, marching its distance field from just above the skin. The nearest miss
+/// gives a penumbra (Quilez, Soft shadows in raymarched SDFs, 2010): the terminator and the chin's shadow are soft.
+__attribute__((noinline)) inline Floats past_head(const Occluder &head, const SkinPoints &p, const Vec3<float> &L) {
+    Floats open = splat(1.0f);
+    if (!head.field) return open;
+    constexpr float sharpness = 12;
+    const float step = float(head.field->spacing);
+    const int longest = std::max({head.field->n[0], head.field->n[1], head.field->n[2]});
+    const Vec3<float> start = head.to_rest(p.x + splat(0.5f * step) * p.normal), toward = head.to_rest.turn(L);
+    Floats way = splat(1.5f * step);
+    for (int march = 0; march < 96 && any<float>((open > 0.0f) & (way < 2 * step * longest)); ++march) {
+        Floats phi;
+        Vec3<float> gradient;
+        sample(*head.field, start + way * toward, phi, gradient);
+        const Floats miss = clamp(sharpness * phi / way, 0, 1);
+        open = way < 2 * step * longest ? minimum<float>(open, miss) : open;
+        way += maximum<float>(phi, splat(0.5f * step));
+    }
+    return open;
+}
+
+/// Fibres between a point anywhere and the light: from where the ray enters the grid.
+inline Floats fibres(const Illumination &light, int l, Vec3<float> g) {
+    const Vec3<float> L = light.direction(l);
+    const Floats from[3] = {g.x, g.y, g.z}, along[3] = {L.x, L.y, L.z};
+    Floats enters = splat(0.0f), leaves = splat(1e30f);
+    for (int axis = 0; axis < 3; ++axis) {
+        const Floats slope = along[axis] < 0.0f ? minimum<float>(along[axis], splat(-1e-6f))
+                                                : maximum<float>(along[axis], splat(1e-6f));
+        const Floats first = (-0.5f - from[axis]) / slope, last = (light.n[axis] - 0.5f - from[axis]) / slope;
+        enters = maximum<float>(enters, minimum<float>(first, last));
+        leaves = minimum<float>(leaves, maximum<float>(first, last));
+    }
+    const Floats n = trilinear(light.depth(light.towards, l), g + enters * L);
+    return enters < leaves ? n : splat(0.0f);
+}
+
+/// Sheen: Blinn-Phong with exponent 32 and Schlick's Fresnel at a skin's 3 %; times N.L.
+RINGLET_INLINE Floats sheen(const SkinPoints &p, const Vec3<float> &L, Floats facing) {
+    const Vec3<float> middle = p.to_eye + L;
+    const Vec3<float> half = (1.0f / square_root<float>(dot(middle, middle) + 1e-12f)) * middle;
+    Floats power = maximum<float>(dot(p.normal, half), splat(0.0f)), miss = 1.0f - maximum<float>(dot(half, L), splat(0.0f));
+    for (int i = 0; i < 5; ++i) power = power * power;
+    miss = miss * miss * miss * miss * miss;
+    return (0.028f + 0.972f * miss) * power * facing * (34 / (8 * 3.14159265f));
+}
+
+inline void light_skin(const SkinPoints &p, const Illumination &light, const Occluder &head, const float loss[3],
+                       Floats radiance[3]) {
+    const Floats albedo[3] = {p.albedo.x, p.albedo.y, p.albedo.z};
+    // Just above the skin: what a half space sees of the sky is half of all directions
+    const Vec3<float> g = in_voxels(light, p.x) + p.normal;
+    Floats around[8];
+    read_surroundings(light, g, around);
+    for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * albedo[c] * minimum<float>(2.0f * around[c], splat(1.0f));
+    for (int l = 0; l < light.lights; ++l) {
+        const Vec3<float> L = light.direction(l);
+        const Floats facing = maximum<float>(dot(p.normal, L), splat(0.0f));
+        if (!any<float>(facing > 0.0f)) continue;
+        const Floats open = past_head(head, p, L), n = fibres(light, l, g), gloss = sheen(p, L, facing);
+        for (int c = 0; c < 3; ++c)
+            radiance[c] += light.irradiance[3 * l + c] * open * exponential(-loss[c] * n) *
+                           (albedo[c] * facing * (1 / 3.14159265f) + gloss);
+    }
+}
+
+/// Fills `radiance` (N, 3).
+inline void shade_surface(const SurfacePoints &surface, size_t count, const Illumination &light, const Occluder &head,
+                          const float loss[3], float *radiance, int threads) {
+    const ptrdiff_t blocks = ptrdiff_t((count + 15) / 16);
+#pragma omp parallel for schedule(dynamic, 16) num_threads(threads)
+    for (ptrdiff_t block = 0; block < blocks; ++block) {
+        const size_t first = 16 * size_t(block);
+        SkinPoints p{read16(surface.points, first, count), read16(surface.normals, first, count), {},
+                     read16(surface.albedo, first, count)};
+        const Vec3<float> eye{splat(float(surface.eye[0])), splat(float(surface.eye[1])), splat(float(surface.eye[2]))};
+        const Vec3<float> way = eye - p.x;
+        p.to_eye = (1.0f / square_root<float>(dot(way, way) + 1e-12f)) * way;
+        Floats sum[3];
+        light_skin(p, light, head, loss, sum);
+        for (size_t i = 0; i < 16 && first + i < count; ++i)
+            for (int c = 0; c < 3; ++c) radiance[3 * (first + i) + c] = sum[c][i];
+    }
+}
+
+} // namespace ringlet

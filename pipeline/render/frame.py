@@ -1,0 +1,177 @@
+"""One frame: expand the strands, let light through them, shade them, draw them and the head."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import kernels
+from pipeline.config.schema import Config
+from pipeline.render.geometry import (
+    Shape,
+    choose_shape,
+    drawn_width,
+    projected_width,
+    ribbons,
+    smooth,
+    taper,
+)
+from pipeline.render.lighting import Lighting
+from pipeline.render.target import Target
+from pipeline.render.tone import develop
+from pipeline.strands.expand import Expansion
+from pipeline.strands.random import normal
+
+Points = NDArray[np.float32]
+Pixels = NDArray[np.uint8]
+
+CHUNK = 65_536  # strands that are in flight at once
+_KEPT = 400 << 20  # [bytes] points that are kept from the first pass for the second
+_MARGIN = 0.02  # [m] that strands may leave the bounds of their guides
+_MELANIN = 31  # salt
+
+
+@dataclass(frozen=True)
+class Skin:
+    """The head as it is drawn, in its rest pose."""
+
+    points: Points
+    """(V, 3) [m]"""
+    triangles: NDArray[np.int32]
+    """(T, 3)"""
+    normals: Points
+    """(V, 3)"""
+    albedo: Points
+    """(V, 3) linear RGB."""
+    field: kernels.DistanceField
+    """Distance to it, for its own shadow."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What is drawn: guides (G, P, 3) float32 [m] and the head's pose (4, 4), rest -> world."""
+
+    guides: Points
+    pose: NDArray[np.float64]
+
+
+class FrameRenderer:
+    """Renders moments of one experiment into one framebuffer."""
+
+    def __init__(
+        self, config: Config, strands: Expansion, key: NDArray[np.uint32], skin: Skin | None = None
+    ) -> None:
+        """Prepare for strands with random keys (N,). Raises InputError when there is no off-screen OpenGL."""
+        render, scene = config.render, config.scene
+        self.render, self.camera = render, scene.camera
+        self.strands, self.key, self.skin = strands, key, skin
+        self.eye = np.array(scene.camera.position, np.float64)
+        self.width = drawn_width(render, strands.count)
+        spread = np.clip(normal(config.seed, key, _MELANIN), -2, 2)
+        jitter = render.hair.melanin_jitter * spread
+        self.melanin = np.clip(render.hair.melanin + jitter, 0, 0.99).astype(np.float32)
+        self.lighting = Lighting(scene, render.hair, render.grid)
+        across, down = (side * render.samples for side in render.size)
+        # Exposure applies to what is lit; the background is meant as it is written.
+        background = np.array(scene.background) / render.exposure
+        self.target = Target(across, down, tuple(background.tolist()))
+
+    def shape(self, moment: Moment) -> tuple[Shape, float]:
+        """How strands are drawn at a moment, and their projected width [px]."""
+        middle = moment.guides.reshape(-1, 3).mean(axis=0, dtype=np.float64)
+        pixels = projected_width(self.render, self.camera, self.width, middle)
+        return choose_shape(self.render, pixels), pixels
+
+    def frame(self, moment: Moment) -> Pixels:
+        """Render a moment: sRGB (H, W, 3) uint8."""
+        self.strands.frame(moment.guides, moment.pose)
+        lower = moment.guides.min(axis=(0, 1)).astype(np.float64) - _MARGIN
+        upper = moment.guides.max(axis=(0, 1)).astype(np.float64) + _MARGIN
+        kept = self._light(moment, lower, upper)
+        corners = self._corners(moment, lower, upper)
+        self.target.clear(self.camera, *self._depths(corners))
+        if self.skin is not None:
+            self._draw_head(self.skin, moment.pose)
+        shape, _ = self.shape(moment)
+        for first, points in kept or self._chunks():
+            self._draw_strands(shape, first, points)
+        return develop(self.target.read(), self.render.samples, self.render.exposure)
+
+    def _light(
+        self, moment: Moment, lower: NDArray[np.float64], upper: NDArray[np.float64]
+    ) -> list[tuple[int, Points]]:
+        """First pass: all strands into the density grid; returns their points where they are few enough to keep."""
+        keep = self.strands.count * self.strands.points * 12 <= _KEPT
+        kept: list[tuple[int, Points]] = []
+        self.lighting.begin(lower, upper, self.width)
+        for first, points in self._chunks(reuse=not keep):
+            self.lighting.add(points, self._widths(points.shape[0], points.shape[1]))
+            if keep:
+                kept.append((first, points))
+        self.lighting.finish(self.skin.field if self.skin else None, moment.pose)
+        return kept
+
+    def _chunks(self, reuse: bool = True) -> Iterator[tuple[int, Points]]:
+        buffer: Points | None = None
+        for first in range(0, self.strands.count, CHUNK):
+            last = min(first + CHUNK, self.strands.count)
+            if buffer is None or not reuse or len(buffer) != last - first:
+                buffer = np.empty((last - first, self.strands.points, 3), np.float32)
+            yield first, self.strands.chunk(first, last, buffer)
+
+    def _widths(self, strands: int, points: int) -> NDArray[np.float32]:
+        profile = np.float32(self.width) * taper(self.render, points)
+        return np.ascontiguousarray(np.broadcast_to(profile, (strands, points)))
+
+    def _draw_strands(self, shape: Shape, first: int, points: Points) -> None:
+        own = slice(first, first + len(points))
+        colours = self.lighting.shade(points, self.melanin[own], self.key[own], self.eye)
+        pieces = self.render.subdivide
+        if pieces > 1:
+            points, colours = smooth(points, pieces), _between(colours, pieces)
+        if shape == "lines":
+            self.target.lines(points, colours)
+            return
+        widths = self._widths(points.shape[0], points.shape[1])
+        if shape == "tubes":
+            self.target.tubes(points, colours, widths, self.render.tube_sides)
+            return
+        edges, triangles = ribbons(points, widths, self.eye)
+        self.target.triangles(edges.reshape(-1, 3), triangles, np.repeat(colours.reshape(-1, 3), 2, axis=0))
+
+    def _draw_head(self, skin: Skin, pose: NDArray[np.float64]) -> None:
+        rotation = pose[:3, :3]
+        points = np.ascontiguousarray(skin.points @ rotation.T + pose[:3, 3], np.float32)
+        normals = np.ascontiguousarray(skin.normals @ rotation.T, np.float32)
+        colours = self.lighting.shade_surface(points, normals, skin.albedo, self.eye)
+        self.target.triangles(points, skin.triangles, colours)
+
+    def _corners(
+        self, moment: Moment, lower: NDArray[np.float64], upper: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        boxes = [np.array([lower, upper])]
+        if self.skin is not None:
+            box = np.array([self.skin.points.min(axis=0), self.skin.points.max(axis=0)], np.float64)
+            boxes.append(_box_corners(box) @ moment.pose[:3, :3].T + moment.pose[:3, 3])
+        return np.concatenate([_box_corners(boxes[0]), *boxes[1:]])
+
+    def _depths(self, corners: NDArray[np.float64]) -> tuple[float, float]:
+        """Nearest and farthest distance [m] of corners along the line of sight."""
+        forward = np.subtract(self.camera.look_at, self.camera.position)
+        depth = (corners - self.eye) @ (forward / np.linalg.norm(forward))
+        return float(depth.min()) - _MARGIN, float(depth.max()) + _MARGIN
+
+
+def _between(colours: NDArray[np.float32], pieces: int) -> NDArray[np.float32]:
+    """Colours of subdivided strands: (S, P, 3) linearly interpolated to (S, (P-1) pieces + 1, 3)."""
+    t = (np.arange(pieces, dtype=np.float32) / np.float32(pieces))[:, None]
+    a, b = colours[:, :-1, None], colours[:, 1:, None]
+    inner = (a + t * (b - a)).reshape(len(colours), -1, 3)
+    return np.concatenate([inner, colours[:, -1:]], axis=1)
+
+
+def _box_corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    """All 8 corners of a box given by its lower and upper corner (2, 3)."""
+    choice = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.asarray(box[choice, np.arange(3)])

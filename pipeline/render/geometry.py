@@ -1,0 +1,76 @@
+"""Strands as shapes: which one fits the projected width, ribbons that face the camera, smooth subdivision."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.config.schema import Camera, Render
+
+Points = NDArray[np.float32]
+Shape = Literal["tubes", "ribbons", "lines"]
+
+RIBBONS_FROM, TUBES_FROM = 1.0, 3.0  # [px] projected widths where `auto` changes
+
+_FIBRE = 80e-6  # [m] a human hair's diameter
+_FULL = 100_000  # strands of a full head
+
+
+def drawn_width(render: Render, strands: int) -> float:
+    """Width [m] of a strand in the picture: the config's, or a fibre's, widened when there are few strands."""
+    if render.width is not None:
+        return render.width
+    return float(_FIBRE * np.sqrt(max(_FULL / strands, 1.0)))
+
+
+def projected_width(render: Render, camera: Camera, width: float, middle: NDArray[np.float64]) -> float:
+    """Width [px] of a strand of `width` [m] that passes through `middle` (3,) [m]."""
+    forward = np.subtract(camera.look_at, camera.position)
+    depth = float((middle - camera.position) @ forward / np.linalg.norm(forward))
+    visible = 2 * max(depth, 1e-6) * np.tan(camera.field_of_view / 2)
+    return float(width / visible * render.size[1])
+
+
+def choose_shape(render: Render, pixels: float) -> Shape:
+    """The shape that the config asks for, or the one that fits a projected width [px]."""
+    if render.geometry != "auto":
+        return render.geometry
+    if pixels >= TUBES_FROM:
+        return "tubes"
+    return "ribbons" if pixels >= RIBBONS_FROM else "lines"
+
+
+def taper(render: Render, points: int) -> NDArray[np.float32]:
+    """Width of each of P points as a fraction of the root's: constant, then thinning out towards the tip."""
+    left = 1 - np.linspace(0, 1, points)
+    profile = np.sqrt(np.clip(left / render.taper, 0, 1)) if render.taper > 0 else np.ones(points)
+    return np.maximum(profile, 0.05).astype(np.float32)
+
+
+def smooth(points: Points, pieces: int) -> Points:
+    """Subdivide segments of (S, P, C) along Catmull and Rom's curve (1974) through the points: (S, (P-1) pieces + 1, C)."""
+    if pieces == 1:
+        return points
+    before, after = 2 * points[:, :1] - points[:, 1:2], 2 * points[:, -1:] - points[:, -2:-1]
+    padded = np.concatenate([before, points, after], axis=1)
+    a, b, c, d = (padded[:, i : i + points.shape[1] - 1, None] for i in range(4))
+    t = (np.arange(pieces, dtype=np.float32) / np.float32(pieces))[:, None]
+    curve = b + t / 2 * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * b - a - 3 * c + d)))
+    inner = curve.reshape(len(points), -1, points.shape[2])
+    return np.ascontiguousarray(np.concatenate([inner, points[:, -1:]], axis=1), np.float32)
+
+
+def ribbons(
+    points: Points, widths: NDArray[np.float32], eye: NDArray[np.float64]
+) -> tuple[Points, NDArray[np.int64]]:
+    """Bands that face the eye: points (S, P, 2, 3) [m] and triangles (2 S (P-1), 3) over their flat order."""
+    tangent = np.empty_like(points)
+    tangent[:, 1:-1] = points[:, 2:] - points[:, :-2]
+    tangent[:, 0], tangent[:, -1] = points[:, 1] - points[:, 0], points[:, -1] - points[:, -2]
+    side = np.cross(tangent, points - eye.astype(np.float32))
+    side *= (widths / 2 / np.maximum(np.linalg.norm(side, axis=2), 1e-20))[..., None]
+    edges = np.stack([points - side, points + side], axis=2)
+    strands, count = points.shape[:2]
+    first = 2 * (np.arange(strands)[:, None] * count + np.arange(count - 1)).reshape(-1, 1)
+    triangles = (first + np.array([[0, 1, 2, 2, 1, 3]])).reshape(-1, 3)
+    return edges, triangles

@@ -1,0 +1,163 @@
+"""Off-screen drawing by VTK through EGL: chunks of lines and triangles into one framebuffer.
+
+Colours are linear RGB, kept in 8 bits as their cube root over a range of 0 .. 4, so that dark hair keeps its tones
+and highlights do not clip before the samples of a pixel are averaged.
+"""
+
+import ctypes.util
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.config.schema import Camera
+from pipeline.errors import InputError
+
+Colours = NDArray[np.float32]
+Points = NDArray[np.float32]
+
+BRIGHTEST = 4.0  # linear value that 255 stands for
+_MARGIN = 1e-3  # [m] between what is drawn and the clipping planes
+
+
+def encode(colours: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """Linear RGB to bytes of the framebuffer."""
+    unit = np.clip(np.asarray(colours, np.float32) / np.float32(BRIGHTEST), 0, 1)
+    return np.asarray(np.cbrt(unit) * 255 + np.float32(0.5), np.uint8)
+
+
+DECODED = (BRIGHTEST * (np.arange(256) / 255) ** 3).astype(np.float32)
+"""Linear value of each byte of the framebuffer."""
+
+
+class Target:
+    """A framebuffer; `clear`, then draw in any number of pieces, then `read`."""
+
+    def __init__(self, width: int, height: int, background: tuple[float, float, float]) -> None:
+        """Open an off-screen window of width x height samples. Raises InputError when there is no EGL."""
+        vtk = _vtk()
+        self._vtk = vtk
+        self.width, self.height = width, height
+        self._renderer = vtk.vtkRenderer()
+        self._renderer.SetBackground(*(encode(np.array(background)) / 255.0).tolist())
+        self._window = vtk.vtkRenderWindow()
+        self._window.SetOffScreenRendering(1)
+        self._window.SetMultiSamples(0)
+        self._window.SetSize(width, height)
+        self._window.AddRenderer(self._renderer)
+        self._mapper = vtk.vtkPolyDataMapper()
+        self._mapper.SetColorModeToDirectScalars()
+        self._mapper.SetScalarModeToUsePointData()
+        self._actor = vtk.vtkActor()
+        self._actor.SetMapper(self._mapper)
+        self._actor.GetProperty().LightingOff()
+        self._renderer.AddActor(self._actor)
+        self._kept: list[Any] = []
+
+    def clear(self, camera: Camera, near: float, far: float) -> None:
+        """Start a picture; what lies between the distances `near` and `far` [m] from the camera is drawn."""
+        view = self._renderer.GetActiveCamera()
+        view.SetPosition(*camera.position)
+        view.SetFocalPoint(*camera.look_at)
+        view.SetViewUp(*camera.up)
+        view.SetViewAngle(np.degrees(camera.field_of_view))
+        view.SetClippingRange(max(near - _MARGIN, 0.01 * far), far + _MARGIN)
+        self._renderer.PreserveColorBufferOff()
+        self._renderer.PreserveDepthBufferOff()
+
+    def triangles(self, points: Points, triangles: NDArray[np.integer[Any]], colours: Colours) -> None:
+        """Draw triangles (T, 3) over points (N, 3) [m] with linear colours (N, 3)."""
+        mesh = self._poly_data(points, colours)
+        mesh.SetPolys(self._cells(np.arange(0, 3 * len(triangles) + 1, 3), triangles.reshape(-1)))
+        self._draw(mesh)
+
+    def lines(self, points: Points, colours: Colours) -> None:
+        """Draw strands (S, P, 3) [m] as polylines one sample wide."""
+        strands, count, _ = points.shape
+        mesh = self._poly_data(points.reshape(-1, 3), colours.reshape(-1, 3))
+        mesh.SetLines(self._cells(np.arange(0, strands * count + 1, count), np.arange(strands * count)))
+        self._draw(mesh)
+
+    def tubes(self, points: Points, colours: Colours, widths: NDArray[np.float32], sides: int) -> None:
+        """Draw strands (S, P, 3) [m] as tubes of widths (S, P) [m] by VTK's tube filter."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk
+
+        strands, count, _ = points.shape
+        mesh = self._poly_data(points.reshape(-1, 3), colours.reshape(-1, 3))
+        mesh.SetLines(self._cells(np.arange(0, strands * count + 1, count), np.arange(strands * count)))
+        radius = numpy_to_vtk(np.ascontiguousarray(widths.reshape(-1) / 2, np.float64), deep=True)
+        radius.SetName("radius")
+        mesh.GetPointData().AddArray(radius)
+        mesh.GetPointData().SetActiveScalars("radius")
+        tube = self._vtk.vtkTubeFilter()
+        tube.SetInputData(mesh)
+        tube.SetNumberOfSides(sides)
+        tube.SetVaryRadiusToVaryRadiusByAbsoluteScalar()
+        tube.CappingOn()
+        tube.Update()
+        drawn = tube.GetOutput()
+        drawn.GetPointData().SetActiveScalars("colour")
+        self._draw(drawn)
+
+    def read(self) -> NDArray[np.uint8]:
+        """The bytes of the framebuffer (H, W, 3), top row first."""
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+
+        pixels = self._vtk.vtkUnsignedCharArray()
+        self._window.GetPixelData(0, 0, self.width - 1, self.height - 1, 0, pixels, 0)
+        return np.asarray(vtk_to_numpy(pixels)).reshape(self.height, self.width, 3)[::-1]
+
+    @property
+    def renderer_name(self) -> str:
+        """Renderer and version strings of OpenGL."""
+        lines = [line.strip() for line in str(self._window.ReportCapabilities()).splitlines()]
+        wanted = ("OpenGL renderer string", "OpenGL version string")
+        found = [line.split(":", 1)[1].strip() for line in lines if line.startswith(wanted)]
+        return ", ".join(found)
+
+    def close(self) -> None:
+        """Free the window."""
+        self._window.Finalize()
+
+    def _draw(self, mesh: Any) -> None:
+        self._mapper.SetInputData(mesh)
+        self._window.Render()
+        self._renderer.PreserveColorBufferOn()
+        self._renderer.PreserveDepthBufferOn()
+        self._kept.clear()
+
+    def _poly_data(self, points: Points, colours: Colours) -> Any:
+        from vtkmodules.util.numpy_support import numpy_to_vtk
+
+        positions = np.ascontiguousarray(points, np.float32)
+        encoded = encode(colours)
+        self._kept += [positions, encoded]  # VTK does not copy them
+        vertices = self._vtk.vtkPoints()
+        vertices.SetData(numpy_to_vtk(positions))
+        scalars = numpy_to_vtk(encoded)
+        scalars.SetName("colour")
+        mesh = self._vtk.vtkPolyData()
+        mesh.SetPoints(vertices)
+        mesh.GetPointData().SetScalars(scalars)
+        return mesh
+
+    def _cells(self, offsets: NDArray[Any], connectivity: NDArray[Any]) -> Any:
+        from vtkmodules.util.numpy_support import numpy_to_vtk
+
+        arrays = [np.ascontiguousarray(a, np.int64) for a in (offsets, connectivity)]
+        self._kept += arrays
+        cells = self._vtk.vtkCellArray()
+        cells.SetData(*(numpy_to_vtk(a) for a in arrays))
+        return cells
+
+
+def _vtk() -> Any:
+    if ctypes.util.find_library("EGL") is None:
+        raise InputError(
+            "render: libEGL is missing; install it by: sudo apt-get install -y libegl1 libgl1-mesa-dri"
+        )
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    import vtk
+
+    return vtk
