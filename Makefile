@@ -34,7 +34,8 @@ $(KERNELS): $(KERNEL_SOURCES) $(ENV)
 	  || { cat build.log; rm -f build.log; exit 1; }
 	@rm -f build.log
 	@$(BIN)/cmake --build build/kernels
-	@$(BIN)/cmake --install build/kernels --prefix . >/dev/null
+	@$(BIN)/cmake --install build/kernels --prefix build/kernels/installed >/dev/null
+	@mv -f build/kernels/installed/pipeline/kernels/*.so pipeline/kernels/
 	@touch $@
 
 # --- Experiments: every configs/x.toml is a target, `make x` or `make outputs/x` ------------------

@@ -43,29 +43,30 @@ class Segments:
     def __init__(self, guides_file: Path, key: str) -> None:
         self.guides_file, self.key = guides_file, key
         self.folder = guides_file.with_suffix(".segments")
+        self._done = 0
 
     def resume(self) -> tuple[int, dict[str, NDArray[Any]] | None]:
         """Number of frames done and the checkpoint after them; removes what does not continue them whole."""
-        done, checkpoint = 0, None
+        self._done, checkpoint = 0, None
         for path in sorted(self.folder.glob("*.h5")):
-            segment = self._whole(path) if path == self._path(done) else None
+            segment = self._whole(path) if path == self._path() else None
             if segment is None:
                 path.unlink()
             else:
                 count, checkpoint = segment
-                done += count
-        return done, checkpoint
+                self._done += count
+        return self._done, checkpoint
 
     def append(self, frames: Sequence[Frame], checkpoint: Mapping[str, NDArray[Any]]) -> None:
-        """Store the next frames and the state after the last of them: a dict of arrays of any shape."""
-        first = sum(self._count(path) for path in sorted(self.folder.glob("*.h5")))
-        with create(self._path(first), KIND, self.key) as writer:
+        """Store the next frames and the state after the last of them, arrays of any shape; call `resume` first."""
+        with create(self._path(), KIND, self.key) as writer:
             writer.write("points", np.stack([frame.points for frame in frames]), chunk_rows=1)
             writer.write("pose", np.stack([frame.pose for frame in frames]))
             for name, array in checkpoint.items():
                 writer.write(f"checkpoint/{name}", np.asarray(array)[None])
             writer.meta["count"] = len(frames)
             writer.meta["diagnostics"] = [dict(frame.diagnostics) for frame in frames]
+        self._done += len(frames)
 
     def frames(self) -> Iterator[Frame]:
         """All frames stored so far, in order, one segment in memory at a time."""
@@ -90,8 +91,8 @@ class Segments:
         """Forget everything."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _path(self, first: int) -> Path:
-        return self.folder / f"{first:08d}.h5"
+    def _path(self) -> Path:
+        return self.folder / f"{self._done:08d}.h5"
 
     def _whole(self, path: Path) -> tuple[int, dict[str, NDArray[Any]]] | None:
         try:
@@ -102,10 +103,6 @@ class Segments:
                 return int(reader.meta["count"]), _checkpoint(reader)
         except InputError:  # damaged, or not a segment: computed again
             return None
-
-    def _count(self, path: Path) -> int:
-        with open(path, KIND) as reader:
-            return int(reader.meta["count"])
 
 
 def _checkpoint(reader: Reader) -> dict[str, NDArray[Any]]:

@@ -25,6 +25,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import ArrayLike, DTypeLike
 
+from pipeline import kernels
 from pipeline.cache.atomic import disk_full, no_room, remove_stale, replacing
 from pipeline.cache.columns import Column, ColumnWriter, Damaged
 from pipeline.errors import InputError
@@ -72,6 +73,7 @@ class Writer:
         now = datetime.now(UTC).isoformat(timespec="seconds")
         record = self._provenance | {
             "libraries": _versions(),
+            "kernels": kernels.VARIANT,
             "host": socket.gethostname(),
             "written": now,
             "wall_time_s": round(time.monotonic() - self._start, 3),

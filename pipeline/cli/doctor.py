@@ -12,7 +12,13 @@ from pathlib import Path
 _GB = 1e9
 _LOW_MEMORY, _LOW_DISK = 2 * _GB, 2 * _GB
 _GL_TIMEOUT_S = 60
-_OPEN_GL = "from pipeline.render.target import Target; print(Target(16, 16, (0.0, 0.0, 0.0)).renderer_name)"
+_DRAW_A_TRIANGLE = """\
+import numpy as np
+from pipeline.render.target import Target
+target = Target(16, 16, (0.0, 0.0, 0.0))
+target.triangles(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]]), np.ones((3, 3), np.float32))
+print(target.renderer_name)
+"""
 
 
 @dataclass(frozen=True)
@@ -68,15 +74,15 @@ def _kernels() -> Check:
 
 def _gl() -> Check:
     # In a process of its own: a broken driver ends it without asking.
-    command = [sys.executable, "-c", _OPEN_GL]
+    command = [sys.executable, "-c", _DRAW_A_TRIANGLE]
     try:
         result = subprocess.run(command, capture_output=True, text=True, timeout=_GL_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         return Check("OpenGL", False, f"no picture within {_GL_TIMEOUT_S} s", _GL_REMEDY)
-    if result.returncode != 0:
-        said = (result.stderr or result.stdout).strip().splitlines()
-        return Check("OpenGL", False, said[-1] if said else f"exit code {result.returncode}", _GL_REMEDY)
-    return Check("OpenGL", True, result.stdout.strip())
+    driver = result.stdout.strip()
+    if result.returncode != 0 or not driver:
+        return Check("OpenGL", False, f"no picture (exit code {result.returncode})", _GL_REMEDY)
+    return Check("OpenGL", True, driver)
 
 
 _GL_REMEDY = "sudo apt-get install -y libegl1 libgl1-mesa-dri"

@@ -30,11 +30,10 @@ static void make_grid(DensityGrid *grid, std::array<int, 3> shape, Doubles3 orig
     require(spacing > 0 && std::isfinite(spacing), "DensityGrid: expected a positive spacing");
     require(width > 0 && std::isfinite(width), "DensityGrid: expected a positive width");
     check_directions(directions, "DensityGrid: expected unit directions");
-    new (grid) DensityGrid{shape, {origin.data()[0], origin.data()[1], origin.data()[2]}, spacing, spacing * width / 4096, {}, {}};
-    for (size_t i = 0; i < directions.shape(0); ++i) {
-        const float *d = directions.data() + 3 * i;
-        grid->lights.push_back({d[0], d[1], d[2]});
-    }
+    const double *o = origin.data();
+    new (grid) DensityGrid{shape, {o[0], o[1], o[2]}, spacing, spacing * width / 4096, int(directions.shape(0)), {}, {}};
+    grid->directions.resize(grid->groups());
+    for (size_t i = 0; i < directions.size(); ++i) grid->directions[i / 12][i % 3][i / 3 % 4] = directions.data()[i];
 }
 
 static void add(DensityGrid &grid, Array<const float, -1, -1, 3> points, Array<const float, -1, -1> widths) {

@@ -26,25 +26,20 @@ struct DensityGrid {
     std::array<double, 3> origin; // outer corner of the first voxel [m]
     double spacing;               // [m]
     double quantum;               // what one count stands for [m^2]
-    std::vector<std::array<float, 3>> lights;
+    int lights;
+    std::vector<std::array<Four, 3>> directions; // for each group of four channels; 0: without direction
     std::vector<std::vector<uint32_t>> counts; // for each thread (channels / 4, nx, ny, nz, 4)
 
     size_t voxels() const { return size_t(shape[0]) * shape[1] * shape[2]; }
-    int channels() const { return int(lights.size()) + 1; }
+    int channels() const { return lights + 1; }
     int groups() const { return (channels() + 3) / 4; }
 };
 
-/// |t x L| for the four channels of each group; 1 for the channel without direction.
-RINGLET_INLINE Four projected(const DensityGrid &grid, int group, const float t[3]) {
-    Four sine{};
-    for (int k = 0; k < 4; ++k) {
-        const int channel = 4 * group + k;
-        if (channel >= grid.channels()) continue;
-        if (channel + 1 == grid.channels()) { sine[k] = 1; continue; }
-        const auto &L = grid.lights[channel];
-        const float cosine = t[0] * L[0] + t[1] * L[1] + t[2] * L[2];
-        sine[k] = std::sqrt(std::max(0.0f, 1 - cosine * cosine));
-    }
+/// |t x L| for four channels; 1 for a channel without direction.
+RINGLET_INLINE Four projected(const std::array<Four, 3> &L, const float t[3]) {
+    const Four cosine = t[0] * L[0] + t[1] * L[1] + t[2] * L[2], square = 1 - cosine * cosine;
+    Four sine;
+    for (int k = 0; k < 4; ++k) sine[k] = std::sqrt(square[k] > 0 ? square[k] : 0);
     return sine;
 }
 
@@ -89,7 +84,7 @@ inline void add_strand(const DensityGrid &grid, uint32_t *counts, const float *p
         const float area = length / steps * 0.5f * (widths[j] + widths[j + 1]) / float(grid.quantum);
         const float t[3] = {e[0] / length, e[1] / length, e[2] / length};
         for (int group = 0; group < grid.groups(); ++group) {
-            const Four share = area * projected(grid, group, t);
+            const Four share = area * projected(grid.directions[group], t);
             for (int s = 0; s < steps; ++s) {
                 const float f = (s + 0.5f) / steps * inverse;
                 const float at[3] = {g[0] + f * e[0], g[1] + f * e[1], g[2] + f * e[2]};

@@ -12,31 +12,33 @@ namespace ringlet {
 
 typedef float Eight __attribute__((vector_size(32)));
 
+/// One lobe's variance v, as M needs it.
+struct Lobe {
+    Floats inverse, norm; // 1 / v and 1 / (v (1 - e^(-2/v)))
+
+    Lobe() = default;
+    RINGLET_INLINE explicit Lobe(Floats v) : inverse(1.0f / v), norm(inverse / (1.0f - exponential(-2.0f * inverse))) {}
+};
+
 struct FibreTables {
     const float *lobes; // (A, T, H, 8): N_R, N_TT, N_TRT, N_rest, G_R, G_TT, G_TRT + G_rest, 0
     const float *sums;  // (A, T, 8): a_f, a_b, circle means of N for R, TT, TRT + rest, v_f, v_b, 0
     int A, T, H;
     float variance[4], absorption_max;
+    Lobe direct[4];                     // of each variance
     float tilt_cosine[4], tilt_sine[4]; // of the shift of theta_o in each lobe
-};
-
-/// One lobe's variance v, as M needs it.
-struct Lobe {
-    Floats inverse, norm; // 1 / v and 1 / (v (1 - e^(-2/v)))
-
-    RINGLET_INLINE explicit Lobe(Floats v) : inverse(1.0f / v), norm(inverse / (1.0f - exponential(-2.0f * inverse))) {}
 };
 
 /// M from cos ti cos to and sin ti sin to; I0 by Abramowitz and Stegun 9.8.1 and 9.8.2, scaled so that nothing overflows.
 RINGLET_INLINE Floats along(Floats cosines, Floats sines, const Lobe &lobe) {
-    const Floats a = cosines * lobe.inverse;
+    const Floats a = cosines * lobe.inverse, root = 1.0f / square_root<float>(maximum<float>(a, splat(3.75f)));
     const Ints large = a > 3.75f;
-    const Floats ratio = a * (1 / 3.75f), y = ratio * ratio, z = 1.0f / maximum<float>(ratio, splat(1.0f));
+    const Floats y = a * a * (1 / (3.75f * 3.75f)), z = 3.75f * root * root;
     Floats small_sum = splat(0.0045813f), large_sum = splat(0.00392377f);
     for (float c : {0.0360768f, 0.2659732f, 1.2067492f, 3.0899424f, 3.5156229f, 1.0f}) small_sum = small_sum * y + c;
     for (float c : {-0.01647633f, 0.02635537f, -0.02057706f, 0.00916281f, -0.00157565f, 0.00225319f, 0.01328592f, 0.39894228f})
         large_sum = large_sum * z + c;
-    const Floats bessel = large ? large_sum / square_root<float>(maximum<float>(a, splat(1.0f))) : small_sum;
+    const Floats bessel = large ? large_sum * root : small_sum;
     // I0 = e^a * large_sum: e^a joins the exponent before it can overflow
     const Floats exponent = -(1.0f + sines - (large ? cosines : splat(0.0f))) * lobe.inverse;
     return bessel * exponential(exponent) * lobe.norm;
@@ -63,10 +65,18 @@ RINGLET_INLINE Eight record(const float *table, size_t index) {
 
 RINGLET_INLINE Eight mean(Eight a, Eight b, float part) { return a + part * (b - a); }
 
-/// Turns 16 records of 8 into 8 entries of 16 lanes.
+/// Turns 16 records of 8 into 8 entries of 16 lanes: three times the even elements first, then the odd ones.
 RINGLET_INLINE void transpose(const Eight records[16], Floats entries[8]) {
-    for (int k = 0; k < 8; ++k)
-        for (int i = 0; i < 16; ++i) entries[k][i] = records[i][k];
+    Floats a[8], b[8];
+    __builtin_memcpy(a, records, sizeof a);
+    for (int round = 0; round < 3; ++round) {
+        for (int i = 0; i < 4; ++i) {
+            b[i] = __builtin_shufflevector(a[2 * i], a[2 * i + 1], 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+            b[i + 4] = __builtin_shufflevector(a[2 * i], a[2 * i + 1], 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+        }
+        __builtin_memcpy(a, b, sizeof a);
+    }
+    __builtin_memcpy(entries, a, sizeof a);
 }
 
 /// Entries of `lobes` for 16 points: linear in absorption, theta_d and phi.

@@ -63,7 +63,8 @@ def fresnel(cosine: _F64) -> _F64:
     inside = np.sqrt(1 - (1 - cosine**2) / ETA**2)
     parallel = (ETA * cosine - inside) / (ETA * cosine + inside)
     perpendicular = (cosine - ETA * inside) / (cosine + ETA * inside)
-    return (parallel**2 + perpendicular**2) / 2
+    reflectance: _F64 = (parallel**2 + perpendicular**2) / 2
+    return reflectance
 
 
 def attenuation(cosine: _F64, h: _F64, sigma: _F64) -> _F64:
@@ -80,19 +81,22 @@ def attenuation(cosine: _F64, h: _F64, sigma: _F64) -> _F64:
 def deflection(p: int, cosine: _F64, h: _F64) -> _F64:
     """Phi_p [rad]: the azimuth in which a ray leaves that met the smooth fibre at offset h."""
     inner = np.arcsin(h * cosine / np.sqrt(ETA**2 - 1 + cosine**2))
-    return 2 * p * inner - 2 * np.arcsin(h) + p * np.pi
+    angle: _F64 = 2 * p * inner - 2 * np.arcsin(h) + p * np.pi
+    return angle
 
 
 def logistic(x: _F64, s: float) -> _F64:
     """D: density [1/rad] of the logistic trimmed to one turn, at any angle x."""
     e = np.exp(-np.abs((x + np.pi) % (2 * np.pi) - np.pi) / s)
-    return e / (s * (1 + e) ** 2 * np.tanh(np.pi / (2 * s)))
+    density: _F64 = e / (s * (1 + e) ** 2 * np.tanh(np.pi / (2 * s)))
+    return density
 
 
 def logistic_integral(x: _F64, s: float) -> _F64:
     """Integral of D from 0 to any angle x; grows by 1 with every turn."""
     turns = np.floor((x + np.pi) / (2 * np.pi))
-    return turns + np.tanh((x - 2 * np.pi * turns) / (2 * s)) / (2 * np.tanh(np.pi / (2 * s)))
+    integral: _F64 = turns + np.tanh((x - 2 * np.pi * turns) / (2 * s)) / (2 * np.tanh(np.pi / (2 * s)))
+    return integral
 
 
 def far_field(cosine: _F64, phi: _F64, sigma: _F64, azimuthal_roughness: float) -> tuple[_F64, _F64]:

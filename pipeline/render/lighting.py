@@ -1,37 +1,138 @@
-"""Light on hair and head in one frame."""
+"""Light on hair and head in one frame: shadows from a grid of voxels, radiance from the shading kernels.
 
-from typing import TYPE_CHECKING
+All strands of a frame are added first, in any chunks, because each shadows all others. Drawn widths count: the grid
+holds the strands that are drawn, so that fewer, wider strands cover and shadow as much as many thin ones.
+"""
+
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
-from pipeline.config.schema import Fibre, Scene
-
-if TYPE_CHECKING:
-    pass
+from pipeline.config.schema import Fibre, Light, Scene
+from pipeline.render import fibre
 
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]
+
+_MARGIN: Final = 3
+"""Empty voxels around the hair, so that blur and slanted rays lose nothing."""
+_SKY_DIRECTIONS: Final = 26
+
+
+def _unit(direction: tuple[float, float, float]) -> _F64:
+    vector = np.array(direction, np.float64)
+    return vector / np.linalg.norm(vector)
+
+
+def _evenly_spread(count: int) -> _F32:
+    """Unit directions (count, 3) on a Fibonacci spiral."""
+    i = np.arange(count) + 0.5
+    z = 1 - 2 * i / count
+    turn = i * np.pi * (3 - np.sqrt(5))
+    r = np.sqrt(1 - z**2)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).astype(np.float32)
+
+
+def _irradiance(light: Light) -> list[float]:
+    return [light.irradiance * channel for channel in light.colour]
+
+
+@dataclass(frozen=True)
+class _Shadowed:
+    """What is known once all strands of a frame are in."""
+
+    light: kernels.Illumination
+    head: kernels.DistanceField | None
+    pose: _F64
 
 
 class Lighting:
     """Light on hair and head, frame by frame: `begin`, `add` all strands, `finish`, then `shade` any of them."""
 
     def __init__(self, scene: Scene, hair: Fibre, grid: int) -> None:
-        """Prepare what does not change from frame to frame: `grid` voxels along the longest side."""
+        """Prepare what does not change from frame to frame: `grid` voxels along the longest side of the hair."""
+        self._hair = hair
+        self._voxels = grid
+        self._directions = np.array([_unit(light.direction) for light in scene.lights], np.float32).reshape(
+            -1, 3
+        )
+        self._irradiance = np.array([_irradiance(light) for light in scene.lights], np.float32).reshape(-1, 3)
+        self._sky = np.array(scene.environment, np.float32)
+        scattering = fibre.Scattering(hair.roughness, hair.azimuthal_roughness, hair.tilt)
+        self._tables = scattering.tables()
+        self._loss = scattering.loss(fibre.absorption(hair.melanin, hair.redness))
+        self._grid: kernels.DensityGrid | None = None
+        self._frame: _Shadowed | None = None
 
     def begin(self, lower: _F64, upper: _F64, width: float) -> None:
-        """Start a frame: bounds (3,) float64 [m] of all strands, and a typical drawn width [m]."""
+        """Start a frame: bounds (3,) float64 [m] of all strands, and a typical drawn width [m].
+
+        Raises:
+            ValueError: bounds that are not finite or upside down.
+
+        """
+        size = np.asarray(upper, np.float64) - lower
+        if not np.isfinite(size).all() or (size < 0).any():
+            raise ValueError(f"bounds of the hair: {lower} to {upper}")
+        spacing = max(float(size.max()), 1e-3) / (self._voxels - 2 * _MARGIN)
+        # Even extents: the sky is sampled on voxels twice as large
+        shape = 2 * np.ceil((size / spacing + 2 * _MARGIN) / 2).astype(int)
+        origin = np.asarray(lower, np.float64) - (shape * spacing - size) / 2
+        nx, ny, nz = (int(extent) for extent in shape)
+        self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width, self._directions)
+        self._frame = None
 
     def add(self, points: _F32, widths: _F32) -> None:
         """Add strands that cast shadows: points (S, P, 3) float32 [m], widths (S, P) float32 [m], in any chunks."""
+        self._started().add(points, widths)
 
     def finish(self, head: kernels.DistanceField | None, pose: _F64) -> None:
         """Let light through what was added and the head, which stands at `pose` (4, 4), rest -> world."""
+        grid = self._started()
+        origin = np.array(grid.origin)
+        density = grid.density()
+        towards = kernels.optical_depth(density[:-1], grid.spacing, self._directions)
+        away = kernels.optical_depth(density[:-1], grid.spacing, -self._directions)
+        if head is None:
+            body = np.zeros(grid.shape, np.float32)
+        else:
+            body = kernels.body_density(head, pose, grid.shape, origin, grid.spacing)
+        shadow = kernels.optical_depth(body[None], grid.spacing, self._directions)
+        # A fibre seen from all sides shows pi / 4 of its length * width
+        sky = kernels.surroundings(
+            density[-1] * np.float32(np.pi / 4),
+            body,
+            grid.spacing,
+            self._loss,
+            _evenly_spread(_SKY_DIRECTIONS),
+        )
+        light = kernels.Illumination(
+            self._directions, self._irradiance, self._sky, (towards, away, shadow), sky
+        )
+        light.origin, light.spacing, light.glints = grid.origin, grid.spacing, self._hair.glints
+        self._frame = _Shadowed(light, head, pose)
+        self._grid = None
 
     def shade(self, points: _F32, melanin: _F32, key: NDArray[np.uint32], eye: _F64) -> _F32:
         """Linear RGB (S, P, 3) float32 of strands (S, P, 3) with melanin (S,) and key (S,) as seen from `eye` (3,)."""
+        absorption = fibre.absorption(melanin, self._hair.redness)
+        return kernels.shade(points, absorption, key, eye, self._finished().light, self._tables)
 
     def shade_surface(self, points: _F32, normals: _F32, albedo: _F32, eye: _F64) -> _F32:
         """Linear RGB (N, 3) float32 of points of the head (N, 3), with unit normals and linear albedo (N, 3)."""
+        frame = self._finished()
+        surface = kernels.Surface(points, normals, albedo)
+        return kernels.shade_surface(surface, eye, frame.light, frame.head, frame.pose, self._loss)
+
+    def _started(self) -> kernels.DensityGrid:
+        if self._grid is None:
+            raise ValueError("begin a frame first")
+        return self._grid
+
+    def _finished(self) -> _Shadowed:
+        if self._frame is None:
+            raise ValueError("finish the frame first")
+        return self._frame
