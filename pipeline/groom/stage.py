@@ -41,17 +41,17 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
 def contact_offset(config: Config, head: Head | None, guides: NDArray[np.float32]) -> NDArray[np.float32]:
     """Distance [m] that guide points (G, P, 3) keep from the skin, (G, P).
 
-    It is the groomed distance between `contact.offset` and `contact.layer`: the hair below holds a guide up. It grows
-    from the root on at most as fast as the strand is long, and shrinks only slowly, so that neighbours of a point
-    agree.
+    It is the groomed distance between `contact.offset` and `contact.layer`: the hair below holds a guide up. From the
+    held root on it grows at most half as fast as the strand is long (a root of a real groom may lie below the
+    skin), and it shrinks only slowly, so that neighbours of a point agree.
     """
     contact = config.simulate.contact
     if head is None:
         return np.full(guides.shape[:2], contact.offset, np.float32)
     groomed = head.field.distance(guides.reshape(-1, 3)).reshape(guides.shape[:2])
     spacing = np.linalg.norm(np.diff(guides, axis=1), axis=2).mean(axis=1)
-    reach = contact.offset + 0.5 * spacing[:, None] * np.arange(guides.shape[1])
-    offset = np.clip(groomed, contact.offset, np.minimum(max(contact.layer, contact.offset), reach))
+    reach = groomed[:, 1:2] + 0.5 * spacing[:, None] * (np.arange(guides.shape[1]) - 1)
+    offset = np.minimum(np.clip(groomed, contact.offset, max(contact.layer, contact.offset)), reach)
     for j in range(1, offset.shape[1]):
         offset[:, j] = np.maximum(offset[:, j], offset[:, j - 1] - 0.25 * spacing)
     return offset.astype(np.float32)

@@ -94,7 +94,7 @@ void bind_expand(nb::module_ &m) {
                  new (self) GuideMotion(make_motion(rest, points, pose));
              },
              nb::arg("rest"), nb::arg("points"), nb::arg("pose"))
-        .def_prop_ro("rotations", &rotations);
+        .def_prop_ro("rotations", &rotations, nb::rv_policy::automatic);
     nb::class_<ExpandStyle>(m, "ExpandStyle")
         .def("__init__",
              [](ExpandStyle *self, float skin, float clump, float frizz) {

@@ -39,7 +39,8 @@ static void make_tables(HeldTables *held, Records lobes, Array<const float, -1, 
     for (int p = 0; p < 4; ++p) {
         require(variance.data()[p] > 0, "FibreTables: expected positive variances");
         tables.variance[p] = variance.data()[p];
-        tables.direct[p] = Lobe(splat(tables.variance[p]));
+        const Lobe lobe(splat(tables.variance[p]));
+        tables.inverse[p] = lobe.inverse[0], tables.norm[p] = lobe.norm[0];
         tables.tilt_cosine[p] = std::cos(tilt.data()[p]), tables.tilt_sine[p] = std::sin(tilt.data()[p]);
     }
     new (held) HeldTables{tables, lobes, sums};

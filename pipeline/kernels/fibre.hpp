@@ -16,7 +16,7 @@ typedef float Eight __attribute__((vector_size(32)));
 struct Lobe {
     Floats inverse, norm; // 1 / v and 1 / (v (1 - e^(-2/v)))
 
-    Lobe() = default;
+    RINGLET_INLINE Lobe(float inverse, float norm) : inverse(splat(inverse)), norm(splat(norm)) {}
     RINGLET_INLINE explicit Lobe(Floats v) : inverse(1.0f / v), norm(inverse / (1.0f - exponential(-2.0f * inverse))) {}
 };
 
@@ -25,7 +25,7 @@ struct FibreTables {
     const float *sums;  // (A, T, 8): a_f, a_b, circle means of N for R, TT, TRT + rest, v_f, v_b, 0
     int A, T, H;
     float variance[4], absorption_max;
-    Lobe direct[4];                     // of each variance
+    float inverse[4], norm[4];          // of each variance, see Lobe
     float tilt_cosine[4], tilt_sine[4]; // of the shift of theta_o in each lobe
 };
 

@@ -136,7 +136,7 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
         const float ct = tables.tilt_cosine[q], st = tables.tilt_sine[q];
         const Floats turned = p.cosine * ct - p.sine * st;
         direct[q] = along(cosine * (turned < 0.0f ? -turned : turned), sine * (p.sine * ct + p.cosine * st),
-                          tables.direct[q]);
+                          Lobe(tables.inverse[q], tables.norm[q]));
     }
 
     const Floats through = exponential(-way.n);

@@ -1,6 +1,7 @@
 """Expansion: rest shapes and lengths are kept whatever the guides do, and a strand depends on nothing but itself."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,8 +30,8 @@ def lengths(points: Points) -> NDArray[np.float64]:
     return np.linalg.norm(np.diff(points.astype(np.float64), axis=1), axis=2)
 
 
-def carried(pose: NDArray[np.float64], points: Points) -> NDArray[np.float64]:
-    return points @ pose[:3, :3].T + pose[:3, 3]
+def carried(pose: NDArray[np.float64], points: Points) -> Points:
+    return (points @ pose[:3, :3].T + pose[:3, 3]).astype(np.float32)
 
 
 def everything(expansion: Expansion) -> Points:
@@ -79,7 +80,7 @@ def test_lengths_are_exact_whatever_the_guides_do() -> None:
 def test_a_turning_head_carries_everything_rigidly() -> None:
     expansion = Expansion(REST, GUIDE_REST, BINDING, sphere(), VARIED)
     still = everything(expansion)
-    expansion.frame(carried(TURNED, GUIDE_REST).astype(np.float32), TURNED)
+    expansion.frame(carried(TURNED, GUIDE_REST), TURNED)
     error = np.abs(everything(expansion) - carried(TURNED, still)).max()
     print(f"off by {error / LENGTH:.1e} of the length")
     assert error < 5e-5 * LENGTH  # the guides come as float32
@@ -103,7 +104,7 @@ def test_points_depend_neither_on_chunks_nor_on_threads(cuts: list[int], threads
     expected = everything(expansion)
     kernels.set_threads(threads)
     bounds = [0, *sorted(cuts), expansion.count]
-    chunks = [expansion.chunk(a, b) for a, b in zip(bounds, bounds[1:], strict=False)]
+    chunks = [expansion.chunk(a, b) for a, b in pairwise(bounds)]
     kernels.set_threads(0)
     assert np.concatenate(chunks).tobytes() == expected.tobytes()
 
@@ -115,7 +116,7 @@ def test_strands_stay_out_of_the_head(angle: float) -> None:
     depth = {}
     for name, field in (("free", None), ("kept out", sphere())):
         expansion = Expansion(REST, GUIDE_REST, BINDING, field, style)
-        expansion.frame(carried(TURNED, swung(GUIDE_REST, angle)).astype(np.float32), TURNED)
+        expansion.frame(carried(TURNED, swung(GUIDE_REST, angle)), TURNED)
         points = carried(np.linalg.inv(TURNED), everything(expansion))
         phi = np.linalg.norm(points, axis=2) - HEAD
         along = np.cumsum(lengths(REST), axis=1)[BINDING.parent] * BINDING.scale[:, None]
@@ -127,20 +128,20 @@ def test_strands_stay_out_of_the_head(angle: float) -> None:
 
 
 def test_roots_below_the_skin_come_out_gently() -> None:
-    sunken = REST - 4e-3 * REST[:, :1] / HEAD
-    expansion = Expansion(sunken, sunken[GROOM.guides.strand], replace(OWN, root=sunken[:, 0]), sphere())
-    points = everything(expansion)
-    phi = np.linalg.norm(points, axis=2) - HEAD
+    sunken = (REST - 0.012 * REST[:, :1] / HEAD).astype(np.float32)
+    roots = replace(OWN, root=np.ascontiguousarray(sunken[:, 0]))
+    points = everything(Expansion(sunken, sunken[GROOM.guides.strand], roots, sphere()))
+    outside = np.linalg.norm(points, axis=2)[:, 8:] - HEAD
     turn = (np.diff(points, axis=1) * np.diff(sunken, axis=1)).sum(axis=2) / lengths(sunken) ** 2
-    print(
-        f"lowest point after 20 mm {phi[:, 4:].min() * 1e3:.2f} mm, largest turn {np.arccos(turn.min()):.2f} rad"
-    )
-    assert phi[:, 4:].min() > 0.4e-3
+    angle = np.arccos(np.minimum(turn, 1)).max()
+    print(f"lowest point after 6 cm {outside.min() * 1e3:.2f} mm, largest turn {angle:.2f} rad")
+    assert outside.min() > 0.4e-3
+    assert 0.01 < angle < 0.8
 
 
 def test_two_guides_give_half_of_each_turn_and_parted_ones_the_nearest(straight: NDArray[np.float64]) -> None:
     rest = straight[None].astype(np.float32)
-    guides = np.concatenate([rest, rest + np.float32([0, 0, 0.01])])
+    guides = np.concatenate([rest, rest + np.array([0, 0, 0.01], np.float32)])
     expansion = single(rest, guides, [0.5, 0.5])
     found = []
     angles = np.linspace(0, np.pi, 181)
@@ -156,17 +157,16 @@ def test_two_guides_give_half_of_each_turn_and_parted_ones_the_nearest(straight:
 
 
 def test_a_strand_reads_its_guide_at_the_same_arc_length(straight: NDArray[np.float64]) -> None:
-    """A guide of twice the length and a bend in its middle bends a strand at its tip only."""
+    """A guide of twice the length that bends at a quarter of it bends a strand in the middle."""
     guide = 2 * straight[None].astype(np.float32)
     moved = guide.copy()
-    moved[0, 17:] = moved[0, 16] + (moved[0, 17:] - moved[0, 16]) @ np.array(
-        [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], np.float32
-    )
+    moved[:, 8:] = about_z(guide[:, 8:], 1.0)
     expansion = single(guide / 2, guide, [1.0])
     expansion.frame(moved, np.eye(4))
     turned = np.abs(np.diff(everything(expansion)[0, :, 1])) > 1e-6
-    print(f"segments that turned: {np.flatnonzero(turned)}")
-    assert not turned[:-2].any()
+    print(f"first segment that turned: {turned.argmax()} of {len(turned)}")
+    assert 14 <= turned.argmax() <= 16
+    assert turned[16:].all()
 
 
 def test_copies_keep_their_parents_first_direction_and_vary_without_stretching() -> None:
@@ -185,12 +185,12 @@ def test_copies_keep_their_parents_first_direction_and_vary_without_stretching()
 
 def test_clump_closes_the_distance_to_the_parent_towards_the_tip() -> None:
     still = replace(BINDING, scale=np.ones_like(BINDING.scale), phase=np.zeros_like(BINDING.phase))
-    rest = np.linspace(REST[:, 0], REST[:, 0] - np.float32([0, LENGTH, 0]), POINTS).swapaxes(0, 1).copy()
+    rest = REST[:, :1] - LENGTH * np.linspace(0, 1, POINTS, dtype=np.float32)[:, None] * np.array([0, 1, 0], np.float32)
     points = everything(Expansion(rest, rest[GROOM.guides.strand], still, None, Style(clump=0.4)))
-    apart = np.linalg.norm(points - rest[BINDING.parent], axis=2)[STRANDS:]
+    apart = np.linalg.norm((points - rest[BINDING.parent])[STRANDS:, :, [0, 2]], axis=2)
     ratio = apart[:, -1] / apart[:, 0]
     print(f"distance at the tip over that at the root: {ratio.min():.3f} .. {ratio.max():.3f}, expected 0.6")
-    assert np.median(ratio) == pytest.approx(0.6, abs=0.02)
+    assert np.abs(ratio - 0.6).max() < 0.02
 
 
 def test_rotations_are_unit_and_of_continuous_sign() -> None:
