@@ -60,6 +60,7 @@ def round_groom(strands: int, points: int, guides: int) -> tuple[Groom, Points]:
     root = HEAD * _upper_half(strands)
     rest = _combed(root, points, 2 * np.pi * uniform(1, np.arange(strands), 0))
     side = np.where(root[:, 0] < 0, -1, 1).astype(np.int8)
+    root = rest[:, 0].astype(np.float64)  # as a groom.h5 has it
     strand = np.arange(guides, dtype=np.uint32)
     chosen = GuideSet(root[strand], shape_of(rest[strand]), side[strand], strand)
     key = np.arange(strands, dtype=np.uint32)

@@ -12,7 +12,7 @@ from pipeline.simulate.stepper import Guides, Simulation
 
 _HEAD = 0.1  # radius [m]
 _LENGTH = 0.25
-_OFFSET = 1e-3
+_OFFSET, _LIFT = 1e-3, 15e-3  # distance that the lowest and the uppermost layer keep from the head [m]
 _FRAMES = 20
 _REPEATS = 7
 
@@ -42,16 +42,23 @@ def bench(
 
 
 def round_head(guides: int, points: int) -> Guides:
-    """Wavy strands that grow from the upper half of a sphere."""
-    roots = _upper_half(guides)
+    """Wavy strands, combed down from the top of a sphere: half of them lies on it, the other half hangs."""
+    height, turn = _upper_half(guides)
     along = np.linspace(0, _LENGTH, points)
-    wave = 0.006 * (1 - np.cos(2 * np.pi * along / 0.06))
-    side = np.cross(roots, [0.0, 0.0, 1.0])
-    strands = roots[:, None] * (_HEAD + _OFFSET + along)[:, None] + side[:, None] * wave[:, None]
+    angle = np.arccos(height) + along / _HEAD
+    hanging = np.maximum(angle - np.pi / 2, 0) * _HEAD
+    angle = np.minimum(angle, np.pi / 2)
+    radius = _HEAD + _OFFSET + _LIFT * (1 - np.exp(-along / 0.05))
+    wave = 0.004 * (1 - np.cos(2 * np.pi * along / 0.06))
+    outwards, down = radius * np.sin(angle), hanging - radius * np.cos(angle)
+    x = outwards * np.cos(turn) - wave * np.sin(turn)
+    z = outwards * np.sin(turn) + wave * np.cos(turn)
+    strands = np.stack([x, -down, z], axis=-1)
+    distance = np.linalg.norm(strands, axis=-1) - _HEAD
     return Guides(
         points=strands.astype(np.float32),
         pins=np.tile(np.array([2, 0], np.uint8), (guides, 1)),
-        offset=np.full((guides, points), _OFFSET, np.float32),
+        offset=np.clip(distance, _OFFSET, _LIFT).astype(np.float32),
         field=_sphere(),
     )
 
@@ -63,11 +70,10 @@ def _timed(simulation: Simulation) -> float:
     return time.perf_counter() - start
 
 
-def _upper_half(count: int) -> NDArray[np.float64]:
-    index = np.arange(count) + 0.5
-    height, turn = 1 - index / count, np.pi * (1 + 5**0.5) * index  # a Fibonacci lattice
-    radius = np.sqrt(1 - height**2)
-    return np.stack([radius * np.cos(turn), height, radius * np.sin(turn)], axis=-1)
+def _upper_half(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Height over radius and angle about the axis, (G, 1) each, of a Fibonacci lattice on half a sphere."""
+    index = np.arange(count)[:, None] + 0.5
+    return 1 - index / count, index * (np.pi * (1 + 5**0.5))
 
 
 def _sphere(spacing: float = 3e-3) -> kernels.DistanceField:

@@ -67,11 +67,11 @@ class Scene(Section):
     """Tone of the skin."""
     background: Colour = (0.2, 0.2, 0.2)
     """Linear RGB behind everything."""
-    environment: Colour = (0.22, 0.22, 0.22)
+    environment: Colour = (0.16, 0.16, 0.16)
     """Linear RGB radiance of a constant sky that lights everything."""
     lights: tuple[Light, ...] = (
-        Light(direction=(0.55, 0.75, 0.80), colour=(1.0, 0.96, 0.9), irradiance=4.0),
-        Light(direction=(-0.90, 0.25, 0.60), colour=(0.85, 0.92, 1.0), irradiance=0.9),
+        Light(direction=(0.55, 0.75, 0.80), colour=(1.0, 0.96, 0.9), irradiance=3.2),
+        Light(direction=(-0.90, 0.25, 0.60), colour=(0.85, 0.92, 1.0), irradiance=0.8),
         Light(direction=(-0.45, 0.55, -0.90), irradiance=2.5),
     )
     """Directional lights: key, fill and rim by default."""
@@ -145,7 +145,9 @@ class Curl(Section):
     """Arc length at which the curl begins."""
     ramp: Annotated[Length, Field(gt=0)] = 0.08
     """Arc length over which it reaches its full radius."""
-    phase_jitter: Annotated[Angle, Field(ge=0)] = 0.35
+    phase_spread: Fraction = 0.35
+    """How much the phase differs from clump to clump: 0 is one wave over the whole head, 1 is random."""
+    phase_jitter: Annotated[Angle, Field(ge=0)] = 0.15
     """Standard deviation of the phase inside a clump."""
     shared_by: Literal["big", "small"] = "big"
     """Which level of clumps shares phase, pitch and handedness."""

@@ -32,7 +32,7 @@ def curled(
     u, v = frames(points, reference)
     spread = 2 * uniform(seed, lock, 80) - 1
     pitch = curl.pitch * (1 + curl.pitch_jitter * spread) * (1 + 0.04 * normal(seed, index, 81))
-    phase = 2 * np.pi * uniform(seed, lock, 82) + curl.phase_jitter * normal(seed, index, 83)
+    phase = 2 * np.pi * curl.phase_spread * uniform(seed, lock, 82) + curl.phase_jitter * normal(seed, index, 83)
     hand = np.where(uniform(seed, lock, 84) < 0.5, -1.0, 1.0)
     radius = curl.radius * np.clip(1 + curl.radius_jitter * normal(seed, lock, 85), 0.3, 1.8)
     radius = radius * (0.85 + 0.3 * uniform(seed, index, 86))

@@ -22,6 +22,8 @@ Feet = Callable[[Points], tuple[Points, Points]]
 # The mannequin's skull [m]: what a mesh is fitted to.
 _CROWN, _BREADTH, _OCCIPUT, _TOP = 0.131, 0.158, -0.0876, 0.075
 
+_STUBBLE = 0.7  # part of the scalp's colour that roots hide
+
 
 @dataclass(frozen=True)
 class Skin:
@@ -70,8 +72,12 @@ def make_head(config: Config) -> Head | None:
     if config.scene.head == "none":
         return None
     if config.scene.head == "builtin":
-        return _mannequin(config.simulate.contact.spacing, config.scene.skin)
-    return _from_mesh(config)
+        head = _mannequin(config.simulate.contact.spacing, config.scene.skin)
+    else:
+        head = _from_mesh(config)
+    if config.groom.source == "procedural":
+        _darken_scalp(head)
+    return head
 
 
 def _mannequin(spacing: float, tone: str) -> Head:
@@ -103,6 +109,12 @@ def _from_mesh(config: Config) -> Head:
     fitted = field.rescaled(scale, offset)
     albedo = np.tile(tone, (len(points), 1)).astype(np.float32)
     return Head(Skin(points, triangles, normals, albedo), field, scale, offset, _grid_feet(fitted))
+
+
+def _darken_scalp(head: Head) -> None:
+    """Roots and stubble between the strands, which no strand stands for."""
+    covered = head.density((head.skin.points - head.offset) / head.scale)
+    head.skin.albedo[:] *= (1 - _STUBBLE * covered)[:, None]
 
 
 def fit_skull(points: Points) -> tuple[float, NDArray[np.float64]]:

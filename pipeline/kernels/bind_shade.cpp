@@ -17,7 +17,7 @@ namespace ringlet {
 using Triples = Array<const float, -1, 3>;
 using Triple = Array<const float, 3>;
 using Point = Array<const double, 3>;
-using Depth = Array<const float, -1, -1, -1, -1>;
+using Depths = Array<const float, -1, -1, -1, -1>;
 using Records = Array<const float, -1, -1, -1, 8>;
 using Strands = Array<const float, -1, -1, 3>;
 using Radiance = nb::ndarray<nb::numpy, float>;
@@ -50,31 +50,30 @@ static void make_tables(HeldTables *held, Records lobes, Array<const float, -1, 
 struct HeldLight : Illumination {
     Triples direction_array, irradiance_array;
     Triple sky_array;
-    std::tuple<Depth, Depth, Depth> depth_arrays;
     Records surrounding_array;
 };
 
 static void make_light(HeldLight *held, Triples directions, Triples irradiance, Triple sky,
-                       std::tuple<Depth, Depth, Depth> depths, Records surroundings) {
-    const auto &[towards, away, body] = depths;
+                       std::tuple<Depths, Depths, Depths> depths, Records surroundings) {
+    const Depths separate[3] = {std::get<0>(depths), std::get<1>(depths), std::get<2>(depths)};
     Illumination light{};
     light.lights = int(directions.shape(0));
     require(irradiance.shape(0) == directions.shape(0), "Illumination: irradiance does not fit directions");
-    for (const Depth *depth : {&towards, &away, &body}) {
-        require(depth->shape(0) == directions.shape(0), "Illumination: depths do not fit directions");
+    for (const Depths &depth : separate) {
+        require(depth.shape(0) == directions.shape(0), "Illumination: depths do not fit directions");
         for (int axis = 1; axis < 4; ++axis)
-            require(depth->shape(axis) == towards.shape(axis), "Illumination: depths differ in shape");
+            require(depth.shape(axis) == separate[0].shape(axis), "Illumination: depths differ in shape");
     }
     for (int axis = 0; axis < 3; ++axis) {
-        light.n[axis] = int(towards.shape(axis + 1));
+        light.n[axis] = int(separate[0].shape(axis + 1));
         require(light.n[axis] >= 4 && size_t(light.n[axis] / 2) == surroundings.shape(axis),
                 "Illumination: surroundings are not half of depths");
     }
-    require(towards.shape(1) * towards.shape(2) * towards.shape(3) < size_t(1) << 31, "Illumination: expected fewer than 2^31 voxels");
+    require(separate[0].size() < size_t(1) << 29, "Illumination: expected fewer than 2^29 voxels for all lights together");
     light.directions = directions.data(), light.irradiance = irradiance.data(), light.sky = sky.data();
-    light.towards = towards.data(), light.away = away.data(), light.body = body.data();
     light.surroundings = surroundings.data();
-    new (held) HeldLight{light, directions, irradiance, sky, depths, surroundings};
+    for (Depth kind : {towards, away, body}) light.interleave(kind, separate[kind].data(), threads());
+    new (held) HeldLight{std::move(light), directions, irradiance, sky, surroundings};
 }
 
 static Radiance shade_strands(Strands points, Triples absorption, Array<const uint32_t, -1> key, Point eye,

@@ -10,6 +10,7 @@
 
 namespace ringlet {
 
+typedef float Four __attribute__((vector_size(16)));
 typedef float Eight __attribute__((vector_size(32)));
 
 /// One lobe's variance v, as M needs it.
@@ -44,64 +45,72 @@ RINGLET_INLINE Floats along(Floats cosines, Floats sines, const Lobe &lobe) {
     return bessel * exponential(exponent) * lobe.norm;
 }
 
-/// A place on one axis of a table: the entry below, and how far the next one is in.
+/// A place on one axis of a table: the entry below, and how far the next one is in. Kept as arrays, because it is
+/// read lane by lane.
 struct Place {
-    Ints at;
-    Floats part;
+    int at[16];
+    float part[16];
 
     /// x in units of entries, clamped to the axis of `count` entries.
     RINGLET_INLINE Place(Floats x, int count) {
         x = clamp(x, 0, float(count - 1));
-        at = whole(minimum<float>(x, splat(count - 1.5f)));
-        part = x - real(at);
+        const Ints below = whole(minimum<float>(x, splat(count - 1.5f)));
+        const Floats rest = x - real(below);
+        __builtin_memcpy(at, &below, sizeof at);
+        __builtin_memcpy(part, &rest, sizeof part);
     }
 };
 
-RINGLET_INLINE Eight record(const float *table, size_t index) {
-    Eight r;
-    __builtin_memcpy(&r, table + 8 * index, sizeof r);
+/// The record (4 or 8 floats) that starts here.
+template <class Record> RINGLET_INLINE Record load(const float *from) {
+    Record r;
+    __builtin_memcpy(&r, from, sizeof r);
     return r;
 }
 
-RINGLET_INLINE Eight mean(Eight a, Eight b, float part) { return a + part * (b - a); }
+template <class Record> RINGLET_INLINE Record mean(Record a, Record b, float part) { return a + part * (b - a); }
 
-/// Turns 16 records of 8 into 8 entries of 16 lanes: three times the even elements first, then the odd ones.
-RINGLET_INLINE void transpose(const Eight records[16], Floats entries[8]) {
-    Floats a[8], b[8];
+/// Turns 16 records of n into n entries of 16 lanes: log2(n) times the even elements first, then the odd ones.
+template <class Record> RINGLET_INLINE void transpose(const Record records[16], Floats *entries) {
+    constexpr int n = sizeof(Record) / 4;
+    Floats a[n], b[n];
     __builtin_memcpy(a, records, sizeof a);
-    for (int round = 0; round < 3; ++round) {
-        for (int i = 0; i < 4; ++i) {
+    for (int width = n; width > 1; width /= 2) {
+        for (int i = 0; i < n / 2; ++i) {
             b[i] = __builtin_shufflevector(a[2 * i], a[2 * i + 1], 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-            b[i + 4] = __builtin_shufflevector(a[2 * i], a[2 * i + 1], 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+            b[i + n / 2] = __builtin_shufflevector(a[2 * i], a[2 * i + 1], 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
         }
         __builtin_memcpy(a, b, sizeof a);
     }
     __builtin_memcpy(entries, a, sizeof a);
 }
 
-/// Entries of `lobes` for 16 points: linear in absorption, theta_d and phi.
-RINGLET_INLINE void read_lobes(const FibreTables &tables, Place level, Place theta, Place phi, Floats entries[8]) {
-    const size_t row = tables.H, sheet = row * tables.T;
-    Eight records[16];
+/// Records linear between 8 neighbours, for 16 points; the next entry along each axis is `stride` floats on.
+template <class Record>
+RINGLET_INLINE void read(const float *table, const Place &x, const Place &y, const Place &z, const size_t stride[3], Floats *entries) {
+    Record records[16];
     for (int i = 0; i < 16; ++i) {
-        const size_t at = level.at[i] * sheet + theta.at[i] * row + phi.at[i];
-        const float h = phi.part[i], t = theta.part[i];
-        const auto read = [&](size_t from) { return mean(record(tables.lobes, from), record(tables.lobes, from + 1), h); };
-        const Eight below = mean(read(at), read(at + row), t), above = mean(read(at + sheet), read(at + sheet + row), t);
-        records[i] = mean(below, above, level.part[i]);
+        const float *at = table + x.at[i] * stride[0] + y.at[i] * stride[1] + z.at[i] * stride[2];
+        const auto edge = [&](const float *from) { return mean(load<Record>(from), load<Record>(from + stride[2]), z.part[i]); };
+        const auto side = [&](const float *from) { return mean(edge(from), edge(from + stride[1]), y.part[i]); };
+        records[i] = mean(side(at), side(at + stride[0]), x.part[i]);
     }
     transpose(records, entries);
 }
 
+/// Entries of `lobes` for 16 points: linear in absorption, theta_d and phi.
+RINGLET_INLINE void read_lobes(const FibreTables &tables, const Place &level, const Place &theta, const Place &phi, Floats entries[8]) {
+    const size_t row = 8 * size_t(tables.H), stride[3] = {row * tables.T, row, 8};
+    read<Eight>(tables.lobes, level, theta, phi, stride, entries);
+}
+
 /// Entries of `sums` for 16 points: linear in absorption and theta_d.
-RINGLET_INLINE void read_sums(const FibreTables &tables, Place level, Place theta, Floats entries[8]) {
+RINGLET_INLINE void read_sums(const FibreTables &tables, const Place &level, const Place &theta, Floats entries[8]) {
     Eight records[16];
     for (int i = 0; i < 16; ++i) {
-        const size_t at = level.at[i] * size_t(tables.T) + theta.at[i];
-        const auto read = [&](size_t from) {
-            return mean(record(tables.sums, from), record(tables.sums, from + 1), theta.part[i]);
-        };
-        records[i] = mean(read(at), read(at + tables.T), level.part[i]);
+        const float *at = tables.sums + 8 * (level.at[i] * size_t(tables.T) + theta.at[i]);
+        const auto edge = [&](const float *from) { return mean(load<Eight>(from), load<Eight>(from + 8), theta.part[i]); };
+        records[i] = mean(edge(at), edge(at + 8 * tables.T), level.part[i]);
     }
     transpose(records, entries);
 }

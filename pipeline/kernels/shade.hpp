@@ -102,8 +102,10 @@ struct Reach {
 /// The strand itself is in the grid: half a voxel towards the light leaves it behind. The jitter breaks up the grid.
 RINGLET_INLINE Reach reach(const FibrePoints &p, const Illumination &light, int l) {
     const Floats step = 0.25f + 0.5f * uniform(mix(p.point + uint32_t(l)));
-    const Floats n = trilinear(light.depth(light.towards, l), p.x + step * light.direction(l));
-    return {n, trilinear(light.depth(light.away, l), p.x), exponential(-trilinear(light.depth(light.body, l), p.x))};
+    Floats ahead[4], here[4];
+    read_depths(light, l, p.x + step * light.direction(l), ahead);
+    read_depths(light, l, p.x, here);
+    return {ahead[towards], here[away], exponential(-here[body])};
 }
 
 /// What one light adds. noinline: the compiler keeps the 16 lanes in registers only in functions of this size.
@@ -166,23 +168,35 @@ inline void read_colour(const FibreTables &tables, FibrePoints &p) {
     }
 }
 
+/// Light of 16 points from everywhere.
+inline void light_block(FibrePoints &p, const Illumination &light, const FibreTables &tables, Floats radiance[3]) {
+    read_colour(tables, p);
+    Floats around[8];
+    read_surroundings(light, p.x, around);
+    const Vec3<float> out{around[4], around[5], around[6]};
+    const Vec3<float> normal = (1.0f / square_root<float>(dot(out, out) + 1e-20f)) * out;
+    for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * p.albedo[c] * around[c];
+    for (int l = 0; l < light.lights; ++l) add_light(p, light, l, tables, normal, radiance);
+}
+
 /// Fills `radiance` (S, P, 3) of S * P = count points.
 inline void shade(const StrandPoints &strands, size_t count, const Illumination &light, const FibreTables &tables,
                   float *radiance, int threads) {
-    const ptrdiff_t blocks = ptrdiff_t((count + 15) / 16);
-#pragma omp parallel for schedule(dynamic, 64) num_threads(threads)
-    for (ptrdiff_t block = 0; block < blocks; ++block) {
-        const size_t first = 16 * size_t(block);
-        FibrePoints p = gather(strands, first, count, light);
-        read_colour(tables, p);
-        Floats around[8], sum[3];
-        read_surroundings(light, p.x, around);
-        const Vec3<float> out{around[4], around[5], around[6]};
-        const Vec3<float> normal = (1.0f / square_root<float>(dot(out, out) + 1e-20f)) * out;
-        for (int c = 0; c < 3; ++c) sum[c] = light.sky[c] * p.albedo[c] * around[c];
-        for (int l = 0; l < light.lights; ++l) add_light(p, light, l, tables, normal, sum);
-        for (size_t i = 0; i < 16 && first + i < count; ++i)
-            for (int c = 0; c < 3; ++c) radiance[3 * (first + i) + c] = sum[c][i];
+    constexpr size_t piece = 1024;
+    const ptrdiff_t pieces = ptrdiff_t((count + piece - 1) / piece);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+    for (ptrdiff_t k = 0; k < pieces; ++k) {
+        const size_t end = std::min((k + 1) * piece, count);
+        FibrePoints next = gather(strands, k * piece, count, light);
+        for (size_t first = k * piece; first < end; first += 16) {
+            FibrePoints p = next;
+            next = gather(strands, first + 16, count, light);
+            fetch_depths(light, next.x);
+            Floats sum[3];
+            light_block(p, light, tables, sum);
+            for (size_t i = 0; i < 16 && first + i < end; ++i)
+                for (int c = 0; c < 3; ++c) radiance[3 * (first + i) + c] = sum[c][i];
+        }
     }
 }
 

@@ -67,8 +67,9 @@ inline Floats fibres(const Illumination &light, int l, Vec3<float> g) {
         enters = maximum<float>(enters, minimum<float>(first, last));
         leaves = minimum<float>(leaves, maximum<float>(first, last));
     }
-    const Floats n = trilinear(light.depth(light.towards, l), g + enters * L);
-    return enters < leaves ? n : splat(0.0f);
+    Floats depths[4];
+    read_depths(light, l, g + enters * L, depths);
+    return enters < leaves ? depths[towards] : splat(0.0f);
 }
 
 /// Sheen: Blinn-Phong with exponent 32 and Schlick's Fresnel at a skin's 3 %; times N.L.

@@ -8,6 +8,10 @@ from pipeline.config.schema import Hair, Simulate
 
 _HEAD, _HAND = 1, 2
 
+_STRAIGHTEST_CURL = (
+    20.0  # [1/m]; wavy hair bends with radii up to 5 cm, the torsion of what bends less is noise
+)
+
 # The drag of air on an isolated fibre of 80 um and 1300 kg/m^3, c = 11 + 15 |u| [1/s], fitted to a cylinder's
 # C_D = 1 + 10 Re^(-2/3); per mass it falls as 1 / (width density).
 _DRAG, _DRAG_SPEED, _FITTED_WIDTH, _FITTED_DENSITY = 11.0, 15.0, 80e-6, 1300.0
@@ -50,6 +54,7 @@ def rest_shape(
         np.full(count, twisting_stiffness(hair)),
         held_points(pins, points.shape[1]),
         np.ascontiguousarray(offset, np.float64),
+        kappa_0=_STRAIGHTEST_CURL,
     )
     # Nearly straight joints have any torsion ("frenet" divides by their bend); half a turn a segment is the most
     # that a strand can show, and what would act once it bends.

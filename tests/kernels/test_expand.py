@@ -27,7 +27,7 @@ TURNED = np.array([[0.36, 0.48, -0.8, 0.3], [-0.8, 0.6, 0.0, -0.2], [0.48, 0.64,
 
 
 def lengths(points: Points) -> NDArray[np.float64]:
-    return np.linalg.norm(np.diff(points.astype(np.float64), axis=1), axis=2)
+    return np.asarray(np.linalg.norm(np.diff(points.astype(np.float64), axis=1), axis=2))
 
 
 def carried(pose: NDArray[np.float64], points: Points) -> Points:
@@ -56,7 +56,7 @@ def single(rest: Points, guides: Points, weights: list[float]) -> Expansion:
 def about_z(points: Points, angle: float) -> Points:
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    return ((points - points[:, :1]) @ turn.T + points[:, :1]).astype(np.float32)
+    return np.asarray((points - points[:, :1]) @ turn.T + points[:, :1], np.float32)
 
 
 @pytest.mark.parametrize("head", [False, True])
@@ -161,7 +161,7 @@ def test_a_strand_reads_its_guide_at_the_same_arc_length(straight: NDArray[np.fl
     guide = 2 * straight[None].astype(np.float32)
     moved = guide.copy()
     moved[:, 8:] = about_z(guide[:, 8:], 1.0)
-    expansion = single(guide / 2, guide, [1.0])
+    expansion = single(straight[None].astype(np.float32), guide, [1.0])
     expansion.frame(moved, np.eye(4))
     turned = np.abs(np.diff(everything(expansion)[0, :, 1])) > 1e-6
     print(f"first segment that turned: {turned.argmax()} of {len(turned)}")
@@ -185,7 +185,9 @@ def test_copies_keep_their_parents_first_direction_and_vary_without_stretching()
 
 def test_clump_closes_the_distance_to_the_parent_towards_the_tip() -> None:
     still = replace(BINDING, scale=np.ones_like(BINDING.scale), phase=np.zeros_like(BINDING.phase))
-    rest = REST[:, :1] - LENGTH * np.linspace(0, 1, POINTS, dtype=np.float32)[:, None] * np.array([0, 1, 0], np.float32)
+    rest = REST[:, :1] - LENGTH * np.linspace(0, 1, POINTS, dtype=np.float32)[:, None] * np.array(
+        [0, 1, 0], np.float32
+    )
     points = everything(Expansion(rest, rest[GROOM.guides.strand], still, None, Style(clump=0.4)))
     apart = np.linalg.norm((points - rest[BINDING.parent])[STRANDS:, :, [0, 2]], axis=2)
     ratio = apart[:, -1] / apart[:, 0]

@@ -62,7 +62,7 @@ def test_result_does_not_depend_on_the_number_of_threads(precision: type) -> Non
 
 @pytest.mark.parametrize("relaxation", ["newton", "sweep"])
 def test_a_strand_moves_the_same_alone_and_among_others(relaxation: str) -> None:
-    """Long undamped steps, so that lanes converge in different rounds and some are halved."""
+    """Long undamped steps, so that lanes converge in different rounds (for halving, see the strand given up alone)."""
     step = settings(dt=1 / 60, relaxation=relaxation, **STILL, damping=0.0)
     rest, state = curly_head(19)
     alone_points = np.ascontiguousarray(rest.points[7:8])
