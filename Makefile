@@ -82,7 +82,7 @@ sheet: render ## the frames of CONFIG on one page
 
 .PHONY: test lint validate images approve bench sanitize schema
 test: env ## all tests
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile
 
 lint: env ## style, types, and who may import whom
 	$(BIN)/ruff check

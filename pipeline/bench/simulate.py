@@ -72,8 +72,8 @@ def _timed(simulation: Simulation) -> float:
 
 def _upper_half(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Height over radius and angle about the axis, (G, 1) each, of a Fibonacci lattice on half a sphere."""
-    index = np.arange(count)[:, None] + 0.5
-    return 1 - index / count, index * (np.pi * (1 + 5**0.5))
+    index = np.arange(count, dtype=np.float64)[:, None] + 0.5
+    return np.asarray(1 - index / count), np.asarray(index * np.pi * (1 + 5**0.5))
 
 
 def _sphere(spacing: float = 3e-3) -> kernels.DistanceField:

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -58,6 +59,14 @@ def experiment_of(loaded: "Loaded", outputs: Path) -> "Experiment":
 
 
 def print_json(value: dict[str, Any]) -> None:
-    """Print one object on standard output."""
-    json.dump(value, sys.stdout, indent=2, ensure_ascii=False)
+    """Print one object on standard output; what is not a finite number is null, as JSON has no other word."""
+    json.dump(_finite(value), sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
     sys.stdout.write("\n")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -34,6 +34,11 @@ def call(arguments: Sequence[str]) -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return WRONG_INPUT
+    except ImportError as error:
+        if error.name != "pipeline.kernels":
+            raise
+        print(f"ringlet: the C++ kernels are not built; run: make env   ({error})", file=sys.stderr)
+        return WRONG_INPUT
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE

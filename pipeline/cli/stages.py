@@ -63,7 +63,7 @@ class Batch:
                 if not state.fresh:
                     say(stage, f"start ({state.reason})")
                     self.execute(stage, state.frames)
-        if state.fresh:
+        if touch and state.fresh:
             say(stage, "fresh")
         if touch:
             for path in self.outputs(stage, frames):

@@ -117,6 +117,8 @@ class Cut(Section):
     """Arc length where no cut height is set, and the longest that a strand gets with one: 0.42 m at most."""
     layers: Annotated[Length, Field(ge=0)] = 0.05
     """How much higher the uppermost layer is cut."""
+    uneven: Annotated[Length, Field(ge=0)] = 0.012
+    """How much longer or shorter the hair of single big clumps is: the hemline is not drawn with a ruler."""
     jitter: Fraction = 0.05
     """Random shortening of single strands, as a fraction of the length."""
 

@@ -14,6 +14,7 @@ from pipeline.strands.random import normal, uniform
 
 Vectors = NDArray[np.float64]
 
+_OWN_PITCH = 0.008  # a strand's pitch within its lock: more would spoil the lock's last turns
 _WAVELENGTHS, _AMPLITUDES = (0.012, 0.03, 0.07), (0.25, 0.5, 1.0)  # [m] of the frizz, and their shares
 
 
@@ -32,7 +33,9 @@ def curled(
     u, v = frames(points, reference)
     spread = 2 * uniform(seed, lock, 80) - 1
     pitch = curl.pitch * (1 + curl.pitch_jitter * spread) * (1 + 0.04 * normal(seed, index, 81))
-    phase = 2 * np.pi * curl.phase_spread * uniform(seed, lock, 82) + curl.phase_jitter * normal(seed, index, 83)
+    phase = 2 * np.pi * curl.phase_spread * uniform(seed, lock, 82) + curl.phase_jitter * normal(
+        seed, index, 83
+    )
     hand = np.where(uniform(seed, lock, 84) < 0.5, -1.0, 1.0)
     radius = curl.radius * np.clip(1 + curl.radius_jitter * normal(seed, lock, 85), 0.3, 1.8)
     radius = radius * (0.85 + 0.3 * uniform(seed, index, 86))
@@ -43,7 +46,12 @@ def curled(
 
 
 def frizzed(
-    frizz: Frizz, seed: int, index: NDArray[np.int64], flyaway: NDArray[np.bool_], points: Vectors, along: Vectors
+    frizz: Frizz,
+    seed: int,
+    index: NDArray[np.int64],
+    flyaway: NDArray[np.bool_],
+    points: Vectors,
+    along: Vectors,
 ) -> Vectors:
     """Points (N, P, 3) with three smooth sines of random direction added, growing over the first 5 cm."""
     if frizz.amplitude == 0:
@@ -57,6 +65,12 @@ def frizzed(
         noise += share * direction[:, None] * wave[..., None]
     amplitude = frizz.amplitude * np.where(flyaway, 3.0, 1.0) * (0.5 + uniform(seed, index, 90))
     return points + (amplitude[:, None] * smoothstep(along / 0.05))[..., None] * noise
+
+
+def _turned(u: Vectors, v: Vectors, angle: Vectors) -> tuple[Vectors, Vectors]:
+    """Frames (N, P, 3) turned about the strand by an angle (N,) [rad]: a wave swings sideways as well as outwards."""
+    c, s = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
+    return c * u + s * v, c * v - s * u
 
 
 def frames(points: Vectors, reference: Vectors) -> tuple[Vectors, Vectors]:

@@ -5,66 +5,65 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from pipeline.config.schema import Config
 from pipeline.errors import InputError
+from pipeline.groom.axes import upright
 from pipeline.groom.heads import Head
-from pipeline.groom.repairs import Repairs, cleaned, turned
+from pipeline.groom.repairs import Repairs, cleaned, pushed_out, turned
 from pipeline.progress import say
 from pipeline.strands.formats import Ragged, read_groom
 from pipeline.strands.random import hashed
-from pipeline.strands.spacing import equal_spacing
+from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
 
 Vectors = NDArray[np.float64]
+Pins = NDArray[np.uint8]
 
-_DENSE = 4  # points of the smooth curve for each point of the resampled strand
-_CLEARANCE = 0.8e-3  # [m] between strands and skin
-_KEY = 7
+_FAR = 0.05  # [m] roots this far from the head are those of another head, or in another unit
+_COARSEST, _FINEST = (
+    4,
+    1 << 16,
+)  # cells along a side of the groom, first and last round of the progressive order
+_ORDER, _KEY = 3, 7  # salts
 
 
 def load(config: Config, head: Head | None) -> tuple[Strands, dict[str, Any]]:
     """The strands of the config's groom file, and a report of what was repaired.
 
-    Raises InputError for a file that does not hold up, or in which no strand has a shape.
+    Raises InputError for a file that does not hold up, in which no strand has a shape, or that does not fit the head.
     """
     groom, path = config.groom, Path(config.groom.source)
-    ragged = read_groom(path)
-    ragged = Ragged(upright(ragged.points * groom.unit_scale, groom.up_axis), ragged.counts, ragged.pins)
+    file = read_groom(path)
     repairs = Repairs()
-    lines, index = cleaned(ragged, repairs)
-    if not lines:
-        raise InputError(f"{path}: none of its {len(ragged)} strands has a shape; check groom.unit_scale")
-    points = np.stack([resampled(line, groom.points) for line in lines])
-    pins = ragged.pins[index].copy()
+    upright_points = upright(file.points * groom.unit_scale, groom.up_axis)
+    kept, index = cleaned(Ragged(upright_points, file.counts, file.pins), repairs)
+    if not len(kept):
+        raise InputError(f"{path}: none of its {len(file)} strands has a shape; check groom.unit_scale")
+    points, pins = evenly_spaced(kept, groom.points)
     if head is not None:
-        points = _on_the_head(points, pins, index, head, repairs)
-    order = progressive_order(points[:, 0], config.seed)[: groom.strands]
+        points, pins = _on_the_head(points, pins, index, head, repairs, path)
     for line in repairs.lines():
         say("groom", f"{path.name}: {line}")
-    strands = _strands(config, points[order], pins[order], head)
-    return strands, {"source": path.name, "file_strands": len(ragged), "repairs": vars(repairs)}
+    order = progressive_order(points[:, 0], config.seed)[: groom.strands]
+    report = {"source": path.name, "file_strands": len(file), "repairs": vars(repairs)}
+    return _strands(config, points[order], pins[order], head), report
 
 
-def upright(points: Vectors, up_axis: str) -> Vectors:
-    """Turn points (N, 3) so that y is up; a file with z up looks along -y, as in Blender."""
-    if up_axis == "z":
-        return points[:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
-    if up_axis == "x":
-        return points[:, [1, 0, 2]] * np.array([-1.0, 1.0, 1.0])
-    return points
+def evenly_spaced(strands: Ragged, count: int) -> tuple[Vectors, Pins]:
+    """Ragged strands as points (S, count, 3) [m] at equal spacing, and how many of them are held (S, 2).
 
-
-def resampled(line: Vectors, count: int) -> Vectors:
-    """A polyline (n, 3) as `count` points at equal spacing along a smooth curve through its points."""
-    along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
-    wanted = np.linspace(0, along[-1], _DENSE * count)
-    if len(line) >= 4:
-        dense = CubicSpline(along, line, bc_type="natural")(wanted)
-    else:
-        dense = np.stack([np.interp(wanted, along, line[:, k]) for k in range(3)], axis=1)
-    return np.asarray(equal_spacing(dense[None], count)[0], np.float64)
+    One held point is a hinge and two are a clamp, whatever the spacing; more than two hold a length of the strand.
+    """
+    points = np.empty((len(strands), count, 3))
+    for n in np.unique(strands.counts):
+        rows = np.flatnonzero(strands.counts == n)
+        points[rows] = resampled(strands.points[strands.first[rows, None] + np.arange(n)], count)
+    pins = strands.pins.astype(np.int64)
+    length = np.rint((pins - 1) * ((count - 1) / (strands.counts[:, None] - 1))).astype(np.int64) + 1
+    pins = np.minimum(np.where(pins > 2, np.maximum(length, 2), pins), count)
+    pins[:, 1] = np.minimum(pins[:, 1], count - pins[:, 0])
+    return points, pins.astype(np.uint8)
 
 
 def progressive_order(roots: Vectors, seed: int) -> NDArray[np.int64]:
@@ -72,48 +71,45 @@ def progressive_order(roots: Vectors, seed: int) -> NDArray[np.int64]:
 
     In each round every cell of the round gives one strand, the one of lowest hash; cells halve from round to round.
     """
-    rank = hashed(seed, np.arange(len(roots)), 3)
-    left = np.lexsort((np.arange(len(roots)), rank))
+    left = np.argsort(hashed(seed, np.arange(len(roots)), _ORDER), kind="stable")
     span = max(float(np.ptp(roots, axis=0).max()), 1e-9)
     order: list[NDArray[np.int64]] = []
-    cells = 4
-    while len(left):
+    cells = _COARSEST
+    while len(left) and cells <= _FINEST:
         cell = np.floor((roots[left] - roots.min(axis=0)) / span * cells).astype(np.int64)
         name = (cell[:, 0] * (cells + 1) + cell[:, 1]) * (cells + 1) + cell[:, 2]
-        _, first = np.unique(name, return_index=True)
-        chosen = np.sort(first)
+        chosen = np.sort(np.unique(name, return_index=True)[1])
         order.append(left[chosen])
         left = np.delete(left, chosen)
-        cells = min(2 * cells, 1 << 16)
-    return np.concatenate(order)
+        cells *= 2
+    return np.concatenate([*order, left])  # roots that share the finest cells come last
 
 
 def _on_the_head(
-    points: Vectors, pins: NDArray[np.uint8], index: NDArray[np.int64], head: Head, repairs: Repairs
-) -> Vectors:
+    points: Vectors, pins: Pins, index: NDArray[np.int64], head: Head, repairs: Repairs, path: Path
+) -> tuple[Vectors, Pins]:
     """Strands turned round where root and tip are swapped, and pushed out of the skin."""
-    ends = [head.field.distance(points[:, k]) for k in (0, -1)]
-    wrong = turned(np.abs(ends[0]), np.abs(ends[1]))
-    points[wrong] = points[wrong, ::-1]
-    pins[wrong] = pins[wrong, ::-1]
+    root, tip = (head.field.distance(points[:, end]) for end in (0, -1))
+    wrong = turned(root, tip)
+    points[wrong], pins[wrong] = points[wrong, ::-1], pins[wrong, ::-1]
+    away = float(np.median(np.abs(np.where(wrong, tip, root))))
+    if away > _FAR:
+        raise InputError(
+            f"{path}: its roots lie {away:.3g} m from the head (median); "
+            "check groom.unit_scale and groom.up_axis, and that scene.head is the head it was made for"
+        )
+    points, through = pushed_out(points, head.field)
     repairs.turned_round += index[wrong].tolist()
-    below = np.zeros(len(points), bool)
-    for _ in range(3):
-        free = points[:, 2:].reshape(-1, 3)
-        d, n = head.field.sample(free)
-        depth = np.maximum(_CLEARANCE - d, 0)
-        below |= (depth > _CLEARANCE).reshape(len(points), -1).any(axis=1)
-        points[:, 2:] = (free + depth[:, None] * n).reshape(points[:, 2:].shape)
-    repairs.pushed_out += index[below].tolist()
-    return equal_spacing(points, points.shape[1])
+    repairs.pushed_out += index[through].tolist()
+    return points, pins
 
 
-def _strands(config: Config, points: Vectors, pins: NDArray[np.uint8], head: Head | None) -> Strands:
+def _strands(config: Config, points: Vectors, pins: Pins, head: Head | None) -> Strands:
     start = points[:, 1] - points[:, 0]
     normal = start / np.linalg.norm(start, axis=1, keepdims=True)
     if head is not None:
         normal = head.field.sample(points[:, 0])[1]
-    pins[:, 0] = np.maximum(pins[:, 0], 2)  # a clamped root needs two points
+    pins[:, 0] = np.maximum(pins[:, 0], 2)  # hair is clamped in its skin: that takes two points
     return Strands(
         points=points.astype(np.float32),
         pins=pins,

@@ -26,6 +26,10 @@ Vectors = NDArray[np.float64]
 STEP = 4e-3  # [m] of arc length
 _CLEARANCE = 0.8e-3  # [m] of the lowest layer
 _DOWN = np.array([0.0, -1.0, 0.0])
+_JAW, _FADE = -0.07, 0.05  # [m] height below which layers sink, and over which
+_LONGEST = 0.42  # [m]
+_FLYAWAY_RISE = 0.3  # most that a flyaway rises above its layer, in units of the lift
+_STRETCH = 8  # steps that a wandering direction lasts
 _TILT, _DIRECTION, _LAYER, _FLYAWAY, _RISE, _BEND, _COMB, _WANDER = 30, 20, 40, 41, 42, 43, 44, 50  # salts
 
 
@@ -68,9 +72,9 @@ def grow(
     """Integrate the strands with these indices from their roots (N, 3) and skin normals (N, 3)."""
     path = groom.path
     own = traits(groom, seed, index)
-    rise = np.where(own.flyaway, 0.006 + 0.010 * uniform(seed, index, _RISE), 0)
-    height = path.lift * (0.25 + 0.75 * own.layer) + rise
-    bend = path.bend * (0.8 + 0.4 * uniform(seed, index, _BEND)) * np.where(own.flyaway, 1.5, 1.0)
+    rise = np.where(own.flyaway, 0.2 + _FLYAWAY_RISE * uniform(seed, index, _RISE), 0)
+    height = path.lift * (0.25 + 0.75 * own.layer + rise)
+    bend = path.bend * (0.8 + 0.4 * uniform(seed, index, _BEND))
     comb_length = path.comb * (0.85 + 0.3 * uniform(seed, index, _COMB))
     front = smoothstep((roots[:, 2] - 0.02) / 0.06)[:, None] * np.array([0, 0, path.sweep])
     comb = _unit(_tangential(_flow(terrain, roots, normals) + front, normals))
@@ -79,12 +83,15 @@ def grow(
     for k in range(1, int(longest(groom) / STEP) + 1):
         s = k * STEP
         d, m = terrain.wall.sample(p)
-        layer = _CLEARANCE + height * smoothstep(np.asarray(s / path.lift_over))
+        sunk = smoothstep((_JAW - p[:, 1]) / _FADE)
+        layer = _CLEARANCE + height * smoothstep(np.asarray(s / path.lift_over)) * (1 - 0.9 * sunk)
         fade = np.exp(-s / comb_length)[:, None]
         flow = _unit(_tangential(_flow(terrain, p, m) + front, m))
-        target = _unit(fade * flow + (1 - fade) * _DOWN + path.wander * _noise(seed, index, k // 8))
+        if k % _STRETCH == 1:
+            noise = path.wander * _noise(seed, index, k // _STRETCH)
+        target = _unit(fade * flow + (1 - fade) * _DOWN + noise)
         dive = np.minimum(_dot(target, m), 0) * smoothstep(1.5 - (d - layer) / 0.006)[:, None]
-        target = _unit(target - dive * m + m * np.clip((layer - d) / 0.012, 0, 0.8)[:, None])
+        target = _unit(target - dive * m + m * np.clip((layer - d) / bend, 0, 0.8)[:, None])
         t = _unit(t + (target - t) * np.minimum(STEP / bend, 1)[:, None])
         ahead, n = terrain.wall.sample(p + STEP * t)
         lowest = np.minimum(layer, _CLEARANCE + 0.25 * s)
@@ -96,29 +103,36 @@ def grow(
 
 def longest(groom: Groom) -> float:
     """Arc length [m] that paths are integrated over."""
-    return 0.42 if groom.cut.height is not None else groom.cut.length
+    return _LONGEST if groom.cut.height is not None else groom.cut.length
 
 
-def cut_lengths(groom: Groom, seed: int, index: NDArray[np.int64], paths: Paths) -> Vectors:
+def cut_lengths(groom: Groom, seed: int, index: NDArray[np.int64], paths: Paths, uneven: Vectors) -> Vectors:
     """Arc length (N,) [m] at which each strand ends: where it falls below the cut height, or the wanted length.
 
-    The hemline is uneven on purpose: layers are cut higher, and every strand has its own jitter, more at few.
+    The hemline is uneven on purpose: layers are cut higher, locks are `uneven` (N,) [m] longer, and every strand has
+    its own jitter, more at few. Below the jaw a strand is measured as if it hung straight down, so that what lies on
+    the shoulders is as long as what hangs beside them.
     """
     cut, available = groom.cut, (paths.points.shape[1] - 1) * STEP
-    own = traits(groom, seed, index)
     lengths = np.full(len(index), available)
     if cut.height is not None:
-        level = cut.height + cut.layers * own.layer**2
-        below = paths.points[:, :, 1] < level[:, None]
-        first = below.argmax(axis=1)
-        # Between the two steps around the level, so that the hemline has no terraces.
-        after = np.maximum(first, 1)
-        row = np.arange(len(index))
-        y0, y1 = paths.points[row, after - 1, 1], paths.points[row, after, 1]
-        part = np.clip((y0 - level) / np.maximum(y0 - y1, 1e-9), 0, 1)
-        lengths = np.where(below.any(axis=1), (after - 1 + part) * STEP, available)
+        level = cut.height - uneven + cut.layers * traits(groom, seed, index).layer ** 2
+        lengths = np.minimum(_arc_to_level(paths.points[:, :, 1], level), available)
     shorter = cut.jitter * (0.5 * uniform(seed, index, 61) + 1.5 * uniform(seed, index, 62) ** 6)
     return np.clip(lengths * (1 - shorter), 0.012, available)
+
+
+def _arc_to_level(height: Vectors, level: Vectors) -> Vectors:
+    """Arc length (N,) [m] at which strands of heights (N, K) [m] reach their level (N,); infinite if they do not."""
+    hung = np.cumsum(height < _JAW, axis=1) * STEP
+    height = np.where(hung > 0, np.minimum(height, _JAW + STEP - hung), height)
+    below = height < level[:, None]
+    after = np.maximum(below.argmax(axis=1), 1)
+    # Between the two steps around the level, so that the hemline has no terraces.
+    row = np.arange(len(height))
+    y0, y1 = height[row, after - 1], height[row, after]
+    part = np.clip((y0 - level) / np.maximum(y0 - y1, 1e-9), 0, 1)
+    return np.where(below.any(axis=1), (after - 1 + part) * STEP, np.inf)
 
 
 def _first_direction(groom: Groom, seed: int, index: NDArray[np.int64], n: Vectors, comb: Vectors) -> Vectors:

@@ -16,7 +16,7 @@ from pipeline.groom.locks import Bundle, Locks
 from pipeline.groom.partings import PartingLine
 from pipeline.groom.paths import STEP, Terrain, cut_lengths, grow, traits
 from pipeline.groom.roots import place_roots
-from pipeline.strands.random import hashed
+from pipeline.strands.random import hashed, uniform
 from pipeline.strands.spacing import equal_spacing
 from pipeline.strands.strands import Strands
 
@@ -25,7 +25,7 @@ Vectors = NDArray[np.float64]
 CHUNK = 8192
 _CLEARANCE = 0.8e-3  # [m] between strands and skin
 _FLYAWAY_CLUMPING = 0.15
-_KEY = 7
+_KEY, _UNEVEN = 7, 63  # salts
 
 
 class Style:
@@ -77,7 +77,9 @@ class Style:
 
     def _in_locks(self, index: NDArray[np.int64]) -> Bundle:
         parts = [self._combed(part)[0] for part in np.array_split(index, max(len(index) // CHUNK, 1))]
-        return Bundle(np.concatenate([part.points for part in parts]), np.concatenate([part.length for part in parts]))
+        return Bundle(
+            np.concatenate([part.points for part in parts]), np.concatenate([part.length for part in parts])
+        )
 
     def _combed(self, index: NDArray[np.int64]) -> tuple[Bundle, Vectors]:
         """Strands gathered in the big clumps, and their comb directions."""
@@ -92,7 +94,9 @@ class Style:
         if len(index) == 0:
             return Bundle(np.zeros((0, self.groom.points, 3)), np.zeros(0)), np.zeros((0, 3))
         paths = grow(self.groom, self.seed, index, self.roots[index], self.normals[index], self.terrain)
-        length = cut_lengths(self.groom, self.seed, index, paths)
+        lock = self.big.of(self.roots[index], self.side[index])
+        uneven = self.groom.cut.uneven * (2 * uniform(self.seed, lock, _UNEVEN) - 1)
+        length = cut_lengths(self.groom, self.seed, index, paths, uneven)
         place = np.linspace(0, 1, self.groom.points) * length[:, None] / STEP
         i = np.minimum(place.astype(np.int64), paths.points.shape[1] - 2)
         u = (place - i)[..., None]

@@ -1,7 +1,8 @@
 """What real groom files need before they can be simulated, each repair reported by strand index.
 
 Strands with points that are not finite, or of almost no length, are dropped; repeated points are merged; a strand
-whose root lies much farther from the head than its tip is turned round; strands of uneven spacing are resampled.
+whose root lies much farther from the head than its tip is turned round; strands that start inside the head are
+pushed out of it, so that contact does not throw them out.
 """
 
 from dataclasses import dataclass, field
@@ -9,10 +10,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.groom.head_field import Field
 from pipeline.strands.formats import Ragged
+from pipeline.strands.resample import resampled
 
 _SHORTEST = 1e-3  # [m] strands below this have no shape
+_REPEATED = 1e-6  # of a strand's length: points this near are one
 _TURNED = 0.01  # [m] how much farther than its tip a root may be from the head
+_CLEARANCE = 0.8e-3  # [m] between strands and skin
 
 
 @dataclass
@@ -38,32 +43,52 @@ class Repairs:
         return [f"{len(which)} strands {text}: {_some(which)}" for which, text in found if which]
 
 
-def cleaned(strands: Ragged, repairs: Repairs) -> tuple[list[NDArray[np.float64]], NDArray[np.int64]]:
-    """Polylines (n, 3) [m] that have a shape, and which strands of the file they are (S,)."""
-    kept: list[NDArray[np.float64]] = []
-    index: list[int] = []
-    finite = np.isfinite(strands.points).all(axis=1)
-    for i, (first, count) in enumerate(zip(strands.first, strands.counts, strict=True)):
-        points = strands.points[first : first + count]
-        if not finite[first : first + count].all():
-            repairs.not_finite.append(i)
-            continue
-        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        if steps.sum() < _SHORTEST:
-            repairs.no_length.append(i)
-            continue
-        distinct = np.r_[True, steps > 1e-6 * steps.sum()]
-        if not distinct.all():
-            repairs.merged_points.append(i)
-            points = points[distinct]
-        kept.append(points)
-        index.append(i)
-    return kept, np.array(index, np.int64)
+def cleaned(strands: Ragged, repairs: Repairs) -> tuple[Ragged, NDArray[np.int64]]:
+    """The strands [m] that have a shape, without repeated points, and which strands of the file they are (S,)."""
+    count = len(strands)
+    owner = np.repeat(np.arange(count), strands.counts)
+    bad = np.bincount(owner, ~np.isfinite(strands.points).all(axis=1), count) > 0
+    step = np.zeros(len(owner))
+    step[1:] = np.linalg.norm(np.diff(np.where(bad[owner, None], 0, strands.points), axis=0), axis=1)
+    step[strands.first[strands.counts > 0]] = 0
+    length = np.bincount(owner, step, count)
+    short = ~bad & (length < _SHORTEST)
+    repeated = (step <= _REPEATED * length[owner]) & (np.arange(len(owner)) > strands.first[owner])
+    kept = ~bad & ~short
+    merged = kept & (np.bincount(owner, repeated, count) > 0)
+    for name, found in (("not_finite", bad), ("no_length", short), ("merged_points", merged)):
+        getattr(repairs, name).extend(np.flatnonzero(found).tolist())
+    left = kept[owner] & ~repeated
+    counts = np.bincount(owner[left], minlength=count)[kept]
+    return Ragged(strands.points[left], counts, strands.pins[kept]), np.flatnonzero(kept)
 
 
 def turned(root: NDArray[np.float64], tip: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which strands have their root at the wrong end, by the distances (S,) [m] of both ends from the head."""
-    return np.asarray(root > tip + _TURNED)
+    return np.asarray(np.abs(root) > np.abs(tip) + _TURNED)
+
+
+def pushed_out(points: NDArray[np.float64], skin: Field) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Strands (S, P, 3) [m] at equal spacing outside of the skin, and which of them (S,) went through it.
+
+    Roots stay, and the second points that hold their directions: groomers set them into the skin.
+    """
+    points = points.copy()
+    through = np.zeros(len(points), bool)
+    rows = np.arange(len(points))
+    for _ in range(4):  # equal spacing moves points back a little
+        free = points[rows, 2:].reshape(-1, 3)
+        distance, normal = skin.sample(free)
+        depth = np.maximum(_CLEARANCE - distance, 0)
+        moved = free + depth[:, None] * normal
+        points[rows, 2:] = moved.reshape(len(rows), -1, 3)
+        depth = depth.reshape(len(rows), -1).max(axis=1)
+        through[rows] |= depth > _CLEARANCE
+        rows = rows[depth > 0]
+        if not len(rows):
+            break
+        points[rows] = resampled(points[rows], points.shape[1])
+    return points, through
 
 
 def _some(which: list[int], most: int = 10) -> str:

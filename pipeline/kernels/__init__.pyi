@@ -251,7 +251,7 @@ class BoundStrands:
         """(N,), (N, 3) [m], (N, k), (N, k), (N,), (N,), (N,) [rad], 1 <= k <= 8; raises ValueError."""
 
 class GuideMotion:
-    """How the guides' segments have turned since rest, seen from the head: their Bishop frames' rotations."""
+    """How the guides' segments have turned since rest, seen from the head: the rotations that strands inherit."""
 
     def __init__(self, rest: NDArray[np.float32], points: NDArray[np.float32], pose: _F64) -> None:
         """Rotations of G guides.

@@ -52,19 +52,6 @@ RINGLET_INLINE void read_depths(const Illumination &light, int l, Vec3<float> g,
     read<Four>(light.depths.data() + 4 * l, x, y, z, stride, entries);
 }
 
-/// Asks for what `read_depths` will read, a block ahead: memory answers later than 16 points take.
-RINGLET_INLINE void fetch_depths(const Illumination &light, Vec3<float> g) {
-    const Place x(g.x, light.n[0]), y(g.y, light.n[1]), z(g.z, light.n[2]);
-    const size_t one = 4 * size_t(light.lights), row = one * light.n[2], slab = row * light.n[1];
-    for (int i = 0; i < 16; ++i) {
-        const float *at = light.depths.data() + x.at[i] * slab + y.at[i] * row + z.at[i] * one;
-        for (size_t corner : {size_t(0), row, slab, slab + row}) {
-            __builtin_prefetch(at + corner);
-            __builtin_prefetch(at + corner + 2 * one - 1);
-        }
-    }
-}
-
 /// Entries of `surroundings`: on voxels twice as large.
 RINGLET_INLINE void read_surroundings(const Illumination &light, Vec3<float> g, Floats entries[8]) {
     const int n[3] = {light.n[0] / 2, light.n[1] / 2, light.n[2] / 2};

@@ -182,21 +182,15 @@ inline void light_block(FibrePoints &p, const Illumination &light, const FibreTa
 /// Fills `radiance` (S, P, 3) of S * P = count points.
 inline void shade(const StrandPoints &strands, size_t count, const Illumination &light, const FibreTables &tables,
                   float *radiance, int threads) {
-    constexpr size_t piece = 1024;
-    const ptrdiff_t pieces = ptrdiff_t((count + piece - 1) / piece);
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
-    for (ptrdiff_t k = 0; k < pieces; ++k) {
-        const size_t end = std::min((k + 1) * piece, count);
-        FibrePoints next = gather(strands, k * piece, count, light);
-        for (size_t first = k * piece; first < end; first += 16) {
-            FibrePoints p = next;
-            next = gather(strands, first + 16, count, light);
-            fetch_depths(light, next.x);
-            Floats sum[3];
-            light_block(p, light, tables, sum);
-            for (size_t i = 0; i < 16 && first + i < end; ++i)
-                for (int c = 0; c < 3; ++c) radiance[3 * (first + i) + c] = sum[c][i];
-        }
+    const ptrdiff_t blocks = ptrdiff_t((count + 15) / 16);
+#pragma omp parallel for schedule(dynamic, 64) num_threads(threads)
+    for (ptrdiff_t block = 0; block < blocks; ++block) {
+        const size_t first = 16 * size_t(block);
+        FibrePoints p = gather(strands, first, count, light);
+        Floats sum[3];
+        light_block(p, light, tables, sum);
+        for (size_t i = 0; i < 16 && first + i < count; ++i)
+            for (int c = 0; c < 3; ++c) radiance[3 * (first + i) + c] = sum[c][i];
     }
 }
 

@@ -93,9 +93,11 @@ class FrameRenderer:
         self.target.clear(self.camera, *self._depths(corners))
         if self.skin is not None:
             self._draw_head(self.skin, moment.pose)
-        shape, _ = self.shape(moment)
+        shape, pixels = self.shape(moment)
+        wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
+        veil = self.lighting.veil(self.eye, wider)
         for first, points in kept or self._chunks():
-            self._draw_strands(shape, first, points)
+            self._draw_strands(shape, first, points, veil.visible(points))
         return develop(self.target.read(), self.render.samples, self.render.exposure)
 
     def _light(
@@ -124,20 +126,27 @@ class FrameRenderer:
         profile = np.float32(self.width) * taper(self.render, points)
         return np.ascontiguousarray(np.broadcast_to(profile, (strands, points)))
 
-    def _draw_strands(self, shape: Shape, first: int, points: Points) -> None:
-        own = slice(first, first + len(points))
+    def _draw_strands(self, shape: Shape, first: int, points: Points, visible: NDArray[np.bool_]) -> None:
+        """Shade and draw what is visible of strands (S, P, 3); `visible` is (S, P)."""
+        seen = np.flatnonzero(visible.any(axis=1))
+        if len(seen) == 0:
+            return
+        own = first + seen
+        points = np.ascontiguousarray(points[seen])
         colours = self.lighting.shade(points, self.melanin[own], self.key[own], self.eye)
+        segments = visible[seen, :-1] | visible[seen, 1:]
         pieces = self.render.subdivide
         if pieces > 1:
             points, colours = smooth(points, pieces), _between(colours, pieces)
+            segments = np.repeat(segments, pieces, axis=1)
         if shape == "lines":
-            self.target.lines(points, colours)
+            self.target.lines(points, colours, segments)
             return
         widths = self._widths(points.shape[0], points.shape[1])
         if shape == "tubes":
             self.target.tubes(points, colours, widths, self.render.tube_sides)
             return
-        edges, triangles = ribbons(points, widths, self.eye)
+        edges, triangles = ribbons(points, widths, self.eye, segments)
         self.target.triangles(edges.reshape(-1, 3), triangles, np.repeat(colours.reshape(-1, 3), 2, axis=0))
 
     def _draw_head(self, skin: Skin, pose: NDArray[np.float64]) -> None:

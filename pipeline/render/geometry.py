@@ -61,16 +61,19 @@ def smooth(points: Points, pieces: int) -> Points:
 
 
 def ribbons(
-    points: Points, widths: NDArray[np.float32], eye: NDArray[np.float64]
+    points: Points, widths: NDArray[np.float32], eye: NDArray[np.float64], drawn: NDArray[np.bool_]
 ) -> tuple[Points, NDArray[np.int64]]:
-    """Bands that face the eye: points (S, P, 2, 3) [m] and triangles (2 S (P-1), 3) over their flat order."""
+    """Bands that face the eye: points (S, P, 2, 3) [m] and triangles (T, 3) over their flat order.
+
+    Segments (S, P-1) that are not `drawn` have no triangles.
+    """
     tangent = np.empty_like(points)
     tangent[:, 1:-1] = points[:, 2:] - points[:, :-2]
     tangent[:, 0], tangent[:, -1] = points[:, 1] - points[:, 0], points[:, -1] - points[:, -2]
     side = np.cross(tangent, points - eye.astype(np.float32))
     side *= (widths / 2 / np.maximum(np.linalg.norm(side, axis=2), 1e-20))[..., None]
     edges = np.stack([points - side, points + side], axis=2)
-    strands, count = points.shape[:2]
-    first = 2 * (np.arange(strands)[:, None] * count + np.arange(count - 1)).reshape(-1, 1)
+    strand, segment = np.nonzero(drawn)
+    first = 2 * (strand * points.shape[1] + segment)[:, None]
     triangles = (first + np.array([[0, 1, 2, 2, 1, 3]])).reshape(-1, 3)
     return edges, triangles

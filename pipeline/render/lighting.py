@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pipeline import kernels
 from pipeline.config.schema import Fibre, Light, Scene
 from pipeline.render import fibre
+from pipeline.render.veil import Veil
 
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]
@@ -20,6 +21,8 @@ _F64 = NDArray[np.float64]
 _MARGIN: Final = 3
 """Empty voxels around the hair, so that blur and slanted rays lose nothing."""
 _SKY_DIRECTIONS: Final = 26
+_OPAQUE: Final = 4
+"""Times that the head is denser for the eye than for light: two voxels of it hide everything."""
 
 
 def _unit(direction: tuple[float, float, float]) -> _F64:
@@ -47,6 +50,10 @@ class _Shadowed:
     light: kernels.Illumination
     head: kernels.DistanceField | None
     pose: _F64
+    hair: _F32
+    """(nx, ny, nz) [1/m]: strands per length of a ray."""
+    body: _F32
+    """(nx, ny, nz) [1/m]: the head as an almost opaque solid."""
 
 
 class Lighting:
@@ -102,8 +109,9 @@ class Lighting:
             body = kernels.body_density(head, pose, grid.shape, origin, grid.spacing)
         shadow = kernels.optical_depth(body[None], grid.spacing, self._directions)
         # A fibre seen from all sides shows pi / 4 of its length * width
+        hair = density[-1] * np.float32(np.pi / 4)
         sky = kernels.surroundings(
-            density[-1] * np.float32(np.pi / 4),
+            hair,
             body,
             grid.spacing,
             self._loss,
@@ -113,8 +121,14 @@ class Lighting:
             self._directions, self._irradiance, self._sky, (towards, away, shadow), sky
         )
         light.origin, light.spacing, light.glints = grid.origin, grid.spacing, self._hair.glints
-        self._frame = _Shadowed(light, head, pose)
+        self._frame = _Shadowed(light, head, pose, hair, body)
         self._grid = None
+
+    def veil(self, eye: _F64, wider: float) -> Veil:
+        """What hair and head hide from an eye (3,) [m], when strands are drawn `wider` than they shadow."""
+        frame = self._finished()
+        density = np.float32(wider) * frame.hair + np.float32(_OPAQUE) * frame.body
+        return Veil(density, np.array(frame.light.origin), frame.light.spacing, eye)
 
     def shade(self, points: _F32, melanin: _F32, key: NDArray[np.uint32], eye: _F64) -> _F32:
         """Linear RGB (S, P, 3) float32 of strands (S, P, 3) with melanin (S,) and key (S,) as seen from `eye` (3,)."""

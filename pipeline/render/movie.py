@@ -24,13 +24,12 @@ def write_movie(frames: Sequence[Path], folder: Path, fps: float) -> Path:
     path = folder / f"{folder.name}.mp4"
     with cache.replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
+        stream.width, stream.height = _even(_load(frames[0])).size
         stream.pix_fmt = "yuv420p"
         stream.options = {"crf": "17", "preset": "medium", "threads": "1"}  # one thread: the same bytes every time
         with track("movie", len(frames)) as bar:
             for frame in frames:
-                picture = _even(_load(frame))
-                stream.width, stream.height = picture.size
-                for packet in stream.encode(av.VideoFrame.from_image(picture)):
+                for packet in stream.encode(av.VideoFrame.from_image(_even(_load(frame)))):
                     container.mux(packet)
                 bar.advance()
         for packet in stream.encode():

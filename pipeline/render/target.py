@@ -72,11 +72,13 @@ class Target:
         mesh.SetPolys(self._cells(np.arange(0, 3 * len(triangles) + 1, 3), triangles.reshape(-1)))
         self._draw(mesh)
 
-    def lines(self, points: Points, colours: Colours) -> None:
-        """Draw strands (S, P, 3) [m] as polylines one sample wide."""
-        strands, count, _ = points.shape
+    def lines(self, points: Points, colours: Colours, drawn: NDArray[np.bool_]) -> None:
+        """Draw segments (S, P-1) of strands (S, P, 3) [m] as lines one sample wide."""
         mesh = self._poly_data(points.reshape(-1, 3), colours.reshape(-1, 3))
-        mesh.SetLines(self._cells(np.arange(0, strands * count + 1, count), np.arange(strands * count)))
+        strand, segment = np.nonzero(drawn)
+        first = strand * points.shape[1] + segment
+        ends = np.stack([first, first + 1], axis=1).reshape(-1)
+        mesh.SetLines(self._cells(np.arange(0, len(ends) + 1, 2), ends))
         self._draw(mesh)
 
     def tubes(self, points: Points, colours: Colours, widths: NDArray[np.float32], sides: int) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.cache.atomic import replacing
+from pipeline.cache import replacing
 from pipeline.progress import say
 
 _LINES = {

@@ -15,23 +15,26 @@ def arc_length(points: Points) -> NDArray[np.float64]:
     return lengths
 
 
+def segments_at(lengths: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Which segment (S, Q) of each strand holds the wanted arc lengths (S, Q) [m]; `lengths` is `arc_length(points)`."""
+    strands, count = lengths.shape
+    offset = np.cumsum(lengths[:, -1] + 1.0)[:, None]  # strands in a row, so that one search serves all
+    right = np.searchsorted((lengths + offset).ravel(), (wanted + offset).ravel(), "right")
+    return np.clip(right.reshape(wanted.shape) - 1 - np.arange(strands)[:, None] * count, 0, count - 2)
+
+
 def at_arc_length(points: Points, lengths: NDArray[np.float64], wanted: NDArray[np.float64]) -> Points:
     """Points (S, Q, 3) on the polylines at arc lengths (S, Q) [m], clamped to their ends.
 
-    `lengths` is `arc_length(points)`; root and tip stay where they are.
+    `lengths` is `arc_length(points)`; root and tip stay where they are. Whatever else is given at the points, as
+    (S, P, K), is interpolated in the same way.
     """
-    strands, count = lengths.shape
-    offset = np.cumsum(lengths[:, -1] + 1.0)[:, None]  # strands in a row, so that one search serves all
     wanted = np.clip(wanted, 0, lengths[:, -1:])
-    right = np.searchsorted((lengths + offset).ravel(), (wanted + offset).ravel(), "right").reshape(
-        wanted.shape
-    )
-    first = np.arange(strands)[:, None] * count
-    left = np.clip(right - 1, first, first + count - 2)
+    left = segments_at(lengths, wanted) + np.arange(len(lengths))[:, None] * lengths.shape[1]
     flat = lengths.ravel()
     span = np.maximum(flat[left + 1] - flat[left], 1e-12)
     weight = np.clip((wanted - flat[left]) / span, 0, 1)[..., None]
-    p = points.reshape(-1, 3)
+    p = points.reshape(-1, points.shape[2])
     return np.asarray(p[left] * (1 - weight) + p[left + 1] * weight)
 
 

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from pipeline import cache
+from pipeline.cli.base import print_json
 from pipeline.cli.main import call
 from pipeline.cli.stages import Batch
+from pipeline.validation import CaseResult
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(Path(__file__).parent))
@@ -267,6 +269,75 @@ def test_an_interrupted_run_leaves_whole_files(tmp_path: Path, signal: str, code
     assert process.returncode == code
     assert "Traceback" not in err
     assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["locks"]
+
+
+def test_json_knows_no_nan(capsys: pytest.CaptureFixture[str]) -> None:
+    print_json({"cases": [{"measured": float("nan")}], "limit": (float("inf"), 1.5)})
+    found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert found == {"cases": [{"measured": None}], "limit": [None, 1.5]}
+
+
+def test_validate_reports_each_case_and_fails_outside_the_tolerance(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = CaseResult("a law", "rotor", 1.001, 1.0, 0.01)
+    monkeypatch.setattr("pipeline.validation.run_cases", lambda quick: [right])
+    assert call(["validate", "--quick", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found == {
+        "passed": True,
+        "cases": [
+            {
+                "name": "a law",
+                "model": "rotor",
+                "measured": 1.001,
+                "reference": 1.0,
+                "tolerance": 0.01,
+                "passed": True,
+            }
+        ],
+    }
+    wrong = CaseResult("another law", "none", float("nan"), 1.0, 0.01)
+    monkeypatch.setattr("pipeline.validation.run_cases", lambda quick: [right, wrong])
+    assert call(["validate"]) == 1
+    assert "another law" in capsys.readouterr().out
+    assert call(["validate", "no such"]) == 2
+
+
+def test_compare_fails_when_a_pixel_differs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pixels = np.full((16, 16, 3), 90, np.uint8)
+    cache.write_picture(tmp_path / "a.png", pixels, "", {})
+    pixels[3, 4] = 200
+    cache.write_picture(tmp_path / "b.png", pixels, "", {})
+    a, b = str(tmp_path / "a.png"), str(tmp_path / "b.png")
+    assert call(["compare", a, a, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["identical"] is True
+    assert call(["compare", a, b, "--page", str(tmp_path / "page.html")]) == 1
+    assert (tmp_path / "page.html").exists()
+    assert call(["compare", a, str(tmp_path / "c.png")]) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "figures"),
+    [
+        (
+            ["simulate", "--guides", "16", "--points", "8", "--threads", "1"],
+            {"ns_per_point_step", "frames_per_second", "threads"},
+        ),
+        (["interpolate", "--strands", "2000", "--points", "8"], {"seconds_per_frame", "peak_rss_gb"}),
+        (
+            ["render", "--strands", "500", "--points", "8", "--size", "64x48", "--samples", "1"],
+            {"seconds_per_frame", "peak_rss_gb", "geometry"},
+        ),
+    ],
+)
+def test_a_benchmark_prints_its_figures_as_one_object(
+    arguments: list[str], figures: set[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["bench", *arguments, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    print(found)
+    assert figures <= found.keys()
 
 
 def test_doctor_reports_every_check(capsys: pytest.CaptureFixture[str]) -> None:

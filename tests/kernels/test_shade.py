@@ -1,0 +1,253 @@
+"""The shading kernel against its formula in numpy, and the laws of light."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.special import ive
+
+from pipeline import kernels
+from pipeline.render import fibre
+
+_F32 = NDArray[np.float32]
+_F64 = NDArray[np.float64]
+
+SCATTERING = fibre.Scattering(0.3, 0.3, np.radians(2))
+FAR = 1e4
+
+
+@dataclass(frozen=True)
+class Room:
+    """The same depths everywhere: fibres towards and behind, body, and a normal."""
+
+    n: float = 0.0
+    behind: float = 0.0
+    body: float = 0.0
+    sky: float = 0.0
+    normal: tuple[float, float, float] = (0.0, 1.0, 0.0)
+
+    def light(self, directions: _F64, irradiance: float = 1.0, glints: bool = False) -> kernels.Illumination:
+        """These depths for lights in these directions (L, 3)."""
+        count, n = len(directions), 4
+        towards, away, body = (
+            np.full((count, n, n, n), depth, np.float32) for depth in (self.n, self.behind, self.body)
+        )
+        around = np.zeros((n // 2, n // 2, n // 2, 8), np.float32)
+        around[..., :3], around[..., 4:7] = 1, self.normal
+        light = kernels.Illumination(
+            directions.astype(np.float32),
+            np.full((count, 3), irradiance, np.float32),
+            np.full(3, self.sky, np.float32),
+            (towards, away, body),
+            around,
+        )
+        light.glints = glints
+        return light
+
+
+def unit(vectors: _F64) -> _F64:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def spread(count: int) -> _F64:
+    i = np.arange(count) + 0.5
+    z, turn = 1 - 2 * i / count, i * np.pi * (3 - np.sqrt(5))
+    return np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=-1)
+
+
+def radiance(tangents: _F64, eye: _F64, light: kernels.Illumination, sigma: _F32 | float) -> _F32:
+    """Radiance (S, 3) of one point each on short strands with these tangents (S, 3), seen from a direction."""
+    points = np.stack([-tangents, tangents], axis=1).astype(np.float32) * np.float32(1e-3)
+    absorption = np.ascontiguousarray(np.broadcast_to(np.float32(sigma), (len(tangents), 3)))
+    key = np.arange(len(tangents), dtype=np.uint32)
+    return kernels.shade(points, absorption, key, FAR * eye, light, SCATTERING.tables())[:, 0]
+
+
+def along(sine_i: _F64, sine_o: _F64, v: float | _F64) -> _F64:
+    """M (d'Eon et al. 2011), with scipy's Bessel function."""
+    a = np.sqrt((1 - sine_i**2) * (1 - sine_o**2)) / v
+    return ive(0, a) * np.exp(a - (1 + sine_i * sine_o) / v) / (v * -np.expm1(-2 / v))
+
+
+def formula(tangents: _F64, eye: _F64, L: _F64, sigma: float, room: Room) -> _F64:
+    """Radiance (S,) by the closed form, without tables; sigma is one channel, which also stands for green."""
+    v, tilt = fibre.variance(0.3), np.radians(2) * np.array([2, -1, -4, 0])
+    si, so = tangents @ L, tangents @ eye
+    theta_d = np.abs(np.arcsin(so) - np.arcsin(si)) / 2
+    phi = np.arccos(np.clip((eye @ L - so * si) / np.sqrt((1 - so**2) * (1 - si**2)), -1, 1))
+    result = np.empty(len(tangents))
+    for k in range(len(tangents)):
+        angles = np.array([phi[k], np.pi - phi[k], 0, np.pi])
+        N, G = (
+            a[:, 0, 0] for a in fibre.far_field(np.cos(theta_d[k : k + 1]), angles, np.array([sigma]), 0.3)
+        )
+        back, forward = np.pi * G[:, 2], np.pi * G[:, 3]
+        a_f, a_b = forward.sum(), back.sum()
+        v_f, v_b = (v @ forward) / a_f, (v @ back) / a_b
+        g = 1 - a_f
+        kappa = np.sqrt(max(g**2 - a_b**2, 1e-6))
+        n, T = room.n, room.n + room.behind
+        den = (kappa + g) + (kappa - g) * np.exp(-2 * kappa * T)
+        returned = np.exp(-kappa * (2 * T - n))
+        down = ((kappa + g) * np.exp(-kappa * n) + (kappa - g) * returned) / den
+        up = a_b * (np.exp(-kappa * n) - returned) / den
+        v_I = min(2, v_f * (n * a_f / -np.expm1(-n * a_f) if n else 1))
+        v_J = min(2, v_b + 2 * v_f / (g + kappa))
+        shifted = np.sin(np.arcsin(so[k]) + tilt)
+        direct = sum(along(si[k], shifted[p], v[p]) * N[p, 0] for p in range(4))
+        scattered = sum(along(si[k], so[k], v[p] + v_I) * G[p, 0] for p in range(4))
+        reflected = sum(along(si[k], so[k], v[p] + v_J) * G[p, 1] for p in range(4))
+        c = np.pi / 2 * max(0.2, float(np.dot(room.normal, L)))
+        result[k] = np.exp(-n) * direct + (down - np.exp(-n)) * scattered + c * up * reflected
+    return result * np.exp(-room.body)
+
+
+def random_tangents(count: int, seed: int) -> _F64:
+    return unit(np.random.default_rng(seed).normal(size=(count, 3)))
+
+
+@pytest.mark.parametrize(
+    "room", [Room(), Room(n=0.4, behind=2.0), Room(n=3.0, behind=0.5, body=0.7), Room(n=12.0, behind=20.0)]
+)
+def test_kernel_follows_the_two_flux_formula(room: Room) -> None:
+    eye, L = unit(np.array([0.3, 0.4, 0.9])), unit(np.array([-0.5, 0.7, 0.2]))
+    tangents = random_tangents(400, 1)
+    tangents = tangents[(np.abs(tangents @ eye) < 0.95) & (np.abs(tangents @ L) < 0.95)]
+    for level in (2, 6, 12):
+        sigma = float(SCATTERING.levels[level])
+        shaded = radiance(tangents, eye, room.light(L[None]), sigma)[:, 1].astype(np.float64)
+        exact = formula(tangents, eye, L, sigma, room)
+        error = np.sqrt(np.mean((shaded - exact) ** 2)) / exact.mean()
+        print(f"{room} sigma {sigma:.2f}: rms {error:.1e} of the mean")
+        assert error < 6e-3
+
+
+def test_absorption_between_levels_costs_little() -> None:
+    eye, L = unit(np.array([0.3, 0.4, 0.9])), unit(np.array([-0.5, 0.7, 0.2]))
+    tangents = random_tangents(200, 2)
+    room = Room(n=0.5, behind=1.0)
+    for sigma in (0.07, 0.389, 0.721, 1.639):
+        shaded = radiance(tangents, eye, room.light(L[None]), sigma)[:, 1].astype(np.float64)
+        exact = formula(tangents, eye, L, sigma, room)
+        error = np.sqrt(np.mean((shaded - exact) ** 2)) / exact.mean()
+        print(f"sigma {sigma}: {error:.1e}")
+        assert error < 0.02
+
+
+def test_white_furnace_returns_what_it_gets() -> None:
+    """Light from everywhere on an unshadowed white fibre: it disappears."""
+    count = 3000
+    light = Room().light(spread(count), 4 * np.pi / count)
+    for degrees in (0, 20, 40, 60):
+        theta = np.radians(degrees)
+        tangent = np.array([[np.sin(theta), np.cos(theta), 0]])
+        found = radiance(tangent, np.array([1.0, 0, 0]), light, 0.0)[0, 0]
+        print(f"theta_o {degrees}: {found:.4f}")
+        # 0.986 .. 1.000 on average: theta_d in place of theta_o
+        assert 0.95 < found < 1.01
+
+
+def test_sky_alone_lights_a_fibre_with_its_albedo() -> None:
+    shaded = radiance(
+        random_tangents(8, 3), np.array([0.0, 0, 1]), Room(sky=2.0).light(np.zeros((0, 3))), 0.0
+    )
+    assert shaded == pytest.approx(2.0, abs=1e-5)
+
+
+def test_swapping_light_and_eye_changes_nothing() -> None:
+    flat = fibre.Scattering(0.3, 0.3, 0.0)
+    tangents = random_tangents(300, 4)
+    a, b = unit(np.array([0.2, 0.5, 0.8])), unit(np.array([-0.6, 0.3, 0.1]))
+    points = np.stack([-tangents, tangents], axis=1).astype(np.float32) * np.float32(1e-3)
+    sigma, key = np.full((300, 3), 0.3, np.float32), np.zeros(300, np.uint32)
+    there, back = (
+        kernels.shade(points, sigma, key, FAR * eye, Room().light(L[None]), flat.tables())
+        for eye, L in ((a, b), (b, a))
+    )
+    error = np.abs(there - back).max() / there.mean()
+    print(f"reciprocity: {error:.1e}")
+    assert error < 2e-3
+
+
+def test_highlight_moves_to_the_tip_and_the_second_one_to_the_root() -> None:
+    """The cuticle's scales turn R by -2 tilt and TRT by +4 tilt: theta_i + theta_o = -4 degrees for R."""
+    L = np.array([0.0, 0, 1])
+    theta_o = np.radians(np.linspace(-40, 40, 801))
+    # Light across the fibre, eye at theta_o, on the light's side: black hair shows R alone
+    tangents = np.stack([np.zeros_like(theta_o), np.cos(theta_o), np.sin(theta_o)], axis=-1)
+    eye = np.array([0.0, 0, 1])
+    shaded = radiance(tangents, eye, Room().light(L[None]), 8.0)[:, 0]
+    # Here eye = light, so theta_i = theta_o = theta: R peaks at 2 theta = -4 degrees
+    peak = np.degrees(theta_o[np.argmax(shaded)])
+    print(f"R peaks at {peak:.1f} degrees")
+    assert peak == pytest.approx(-2.0, abs=0.5)
+
+
+def test_white_slab_returns_no_more_than_it_gets() -> None:
+    """Exitance of a deep white layer of parallel fibres, lit along its normal."""
+    nodes, weights = np.polynomial.laguerre.laggauss(12)
+    lit = np.array([[0.0, 1, 0]])
+    theta, wt = np.polynomial.legendre.leggauss(8)
+    phi, wp = np.polynomial.legendre.leggauss(8)
+    exitance = 0.0
+    for t, a in zip(theta * np.pi / 2, wt * np.pi / 2, strict=True):
+        for f, b in zip(phi * np.pi / 2, wp * np.pi / 2, strict=True):
+            eye = np.array([np.sin(t), np.cos(t) * np.cos(f), np.cos(t) * np.sin(f)])
+            # Along the eye's ray a fibre at depth n is seen with probability e^{-n / cos phi}
+            pixel = sum(
+                w * radiance(np.array([[1.0, 0, 0]]), eye, Room(n * np.cos(f), 1e4).light(lit), 0.0)[0, 0]
+                for n, w in zip(nodes, weights, strict=True)
+            )
+            exitance += a * b * np.cos(t) * np.cos(t) * np.cos(f) * pixel
+    print(f"white slab: exitance {exitance:.3f} of irradiance")
+    assert 0.75 < exitance < 1.02
+
+
+@pytest.mark.parametrize("n", [0.2, 1.0, 2.5])
+def test_glints_keep_the_mean(n: float) -> None:
+    tangents = np.repeat([[1.0, 0, 0]], 200_000, axis=0)
+    eye, L = np.array([0.0, 0, 1]), unit(np.array([0.1, 0.5, 0.8]))[None]
+    room = Room(n=n, behind=1.0)
+    smooth = radiance(tangents[:1], eye, room.light(L), 0.5)[0]
+    glinting = radiance(tangents, eye, room.light(L, glints=True), 0.5)
+    error = np.abs(glinting.mean(0, dtype=np.float64) / smooth - 1).max()
+    print(f"n {n}: mean moves by {error:.1e}; contrast {glinting[:, 0].std() / smooth[0]:.2f}")
+    assert error < 0.01
+    assert glinting[:, 0].std() > 0.1 * smooth[0]
+
+
+def test_shading_does_not_depend_on_threads_or_company() -> None:
+    before = kernels.threads()
+    rng = np.random.default_rng(5)
+    points = np.cumsum(rng.normal(size=(203, 7, 3)), axis=1).astype(np.float32) * np.float32(1e-3)
+    sigma = rng.uniform(0, 2, (203, 3)).astype(np.float32)
+    key = rng.integers(0, 2**32, 203, dtype=np.uint32)
+    light = Room(n=0.5, behind=1.0).light(spread(3), glints=True)
+    eye, tables = np.array([0.1, 0.2, 1.0]), SCATTERING.tables()
+    kernels.set_threads(1)
+    alone = kernels.shade(points, sigma, key, eye, light, tables)
+    kernels.set_threads(3)
+    assert np.array_equal(kernels.shade(points, sigma, key, eye, light, tables), alone)
+    kernels.set_threads(before)
+    part = kernels.shade(points[50:90], sigma[50:90], key[50:90], eye, light, tables)
+    assert np.array_equal(part, alone[50:90])
+
+
+def test_broken_strands_give_finite_colours() -> None:
+    points = np.zeros((3, 4, 3), np.float32)
+    points[1] = 1e30
+    points[2] = np.nan
+    light = Room(n=0.5, behind=1.0).light(spread(2))
+    sigma, key = np.full((3, 3), 0.5, np.float32), np.zeros(3, np.uint32)
+    shaded = kernels.shade(points, sigma, key, np.array([0.0, 0, 1]), light, SCATTERING.tables())
+    assert np.isfinite(shaded[0]).all()
+
+
+def test_wrong_arrays_are_refused() -> None:
+    light, tables = Room().light(spread(2)), SCATTERING.tables()
+    points, key = np.zeros((2, 4, 3), np.float32), np.zeros(2, np.uint32)
+    with pytest.raises(ValueError, match="do not fit points"):
+        kernels.shade(points, np.zeros((3, 3), np.float32), key, np.zeros(3), light, tables)
+    with pytest.raises(ValueError, match="2 or more points"):
+        kernels.shade(points[:, :1].copy(), np.zeros((2, 3), np.float32), key, np.zeros(3), light, tables)

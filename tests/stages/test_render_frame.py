@@ -1,0 +1,147 @@
+"""Whole frames of a few strands: what hides what, chunks, background, provenance."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from pipeline import cache, kernels
+from pipeline.config.schema import Camera, Config, Groom, Render, Scene
+from pipeline.render import frame as frame_module
+from pipeline.render.frame import FrameRenderer, Moment, Skin
+from pipeline.render.movie import write_movie, write_sheet
+from pipeline.render.tone import to_srgb
+from pipeline.strands.expand import Binding, Expansion
+
+EYE = (0.0, 0.0, 0.6)
+
+
+def config(**render: object) -> Config:
+    camera = Camera(position=EYE, look_at=(0, 0, 0), field_of_view=0.4)
+    options = {"size": (96, 96), "grid": 32} | render
+    scene = Scene(head="none", camera=camera, background=(0.2, 0.4, 0.1))
+    return Config(name="small", scene=scene, groom=Groom(source="swatch"), render=Render(**options))
+
+
+def expansion(rest: NDArray[np.float32]) -> Expansion:
+    count = len(rest)
+    own = np.arange(count, dtype=np.uint32)
+    binding = Binding(
+        parent=own,
+        root=np.ascontiguousarray(rest[:, 0]),
+        guide=own[:, None].copy(),
+        weight=np.ones((count, 1), np.float32),
+        key=own * np.uint32(2654435761),
+        scale=np.ones(count, np.float32),
+        phase=np.zeros(count, np.float32),
+    )
+    return Expansion(rest, rest, binding)
+
+
+def hanging(count: int, depth: float = 0.0) -> NDArray[np.float32]:
+    """Vertical strands side by side in the plane z = depth."""
+    x = np.linspace(-0.05, 0.05, count) if count > 1 else np.zeros(1)
+    y = np.linspace(0.05, -0.05, 16)
+    points = np.zeros((count, 16, 3), np.float32)
+    points[..., 0], points[..., 1], points[..., 2] = x[:, None], y, depth
+    return points
+
+
+def render(settings: Config, rest: NDArray[np.float32], skin: Skin | None = None) -> NDArray[np.uint8]:
+    strands = expansion(rest)
+    renderer = FrameRenderer(settings, strands, np.arange(len(rest), dtype=np.uint32), skin)
+    picture = renderer.frame(Moment(rest, np.eye(4)))
+    renderer.target.close()
+    return picture
+
+
+def ball(radius: float = 0.02) -> Skin:
+    """A head in the shape of a ball at the origin."""
+    import pyvista as pv
+
+    sphere = pv.Sphere(radius=radius, theta_resolution=24, phi_resolution=24)
+    axis = np.arange(-0.06, 0.061, 0.004)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    distance = (np.sqrt(x**2 + y**2 + z**2) - radius).astype(np.float32)
+    points = np.asarray(sphere.points, np.float32)
+    return Skin(
+        points=points,
+        triangles=np.asarray(sphere.regular_faces, np.int32),
+        normals=points / np.float32(radius),
+        albedo=np.full(points.shape, 0.5, np.float32),
+        field=kernels.DistanceField(distance, np.full(3, axis[0]), 0.004),
+    )
+
+
+def test_the_background_has_the_colour_of_the_config() -> None:
+    corner = render(config(), hanging(3))[0, 0].astype(int)
+    wanted = np.round(255 * to_srgb(np.array([0.2, 0.4, 0.1]))).astype(int)
+    print(f"background {corner}, wanted {wanted}")
+    assert np.abs(corner - wanted).max() <= 3
+
+
+@pytest.mark.parametrize("geometry", ["lines", "ribbons", "tubes"])
+def test_any_chunking_gives_the_same_pixels(geometry: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = config(geometry=geometry, width=1e-3)
+    whole = render(settings, hanging(40))
+    monkeypatch.setattr(frame_module, "CHUNK", 7)
+    assert np.array_equal(render(settings, hanging(40)), whole)
+    monkeypatch.setattr(frame_module, "_KEPT", 0)
+    assert np.array_equal(render(settings, hanging(40)), whole)
+
+
+@pytest.mark.parametrize("geometry", ["ribbons", "tubes"])
+def test_a_strand_is_as_wide_as_it_should_be(geometry: str) -> None:
+    settings = config(geometry=geometry, width=0.01, taper=0, samples=4)
+    picture = render(settings, hanging(1)).astype(int)
+    row = np.abs(picture[48] - picture[0, 0]).max(axis=1)
+    covered = int((row > 30).sum())
+    wanted = 0.01 / (2 * 0.6 * np.tan(0.2)) * 96
+    print(f"{geometry}: {covered} px, wanted {wanted:.2f}")
+    assert abs(covered - wanted) <= 1.5
+
+
+def test_the_head_hides_what_is_behind_it() -> None:
+    settings = config(geometry="ribbons", width=2e-3)
+    empty, behind, before = (
+        render(settings, hanging(1, depth), ball()).astype(int) for depth in (5.0, -0.04, 0.04)
+    )
+    middle = (slice(46, 50), slice(44, 52))
+    assert np.abs(behind[middle] - empty[middle]).max() <= 12
+    assert np.abs(before[middle] - empty[middle]).max() > 30
+
+
+def test_a_frame_of_the_same_moment_has_the_same_bytes() -> None:
+    settings = config()
+    assert np.array_equal(render(settings, hanging(30)), render(settings, hanging(30)))
+
+
+def test_pictures_carry_their_key_and_broken_ones_are_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "0001.png"
+    cache.write_picture(path, render(config(), hanging(3)), "key", {"seed": 1}, fingerprint="here")
+    assert cache.picture_record(path) == ("key", {"seed": 1})
+    with Image.open(path) as image:
+        assert image.info["ringlet.fingerprint"] == "here"
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(cache.Damaged):
+        cache.picture_record(path)
+
+
+def test_movie_and_contact_sheet_hold_the_frames(tmp_path: Path) -> None:
+    frames = []
+    for i in range(5):
+        frames.append(tmp_path / f"{i:04d}.png")
+        Image.fromarray(np.full((33, 65, 3), 40 * i, np.uint8)).save(frames[-1])
+    movie, sheet = write_movie(frames, tmp_path, 24), write_sheet(frames, tmp_path)
+    with Image.open(sheet) as image:
+        assert image.size[0] == 5 * 320
+    if movie.suffix == ".mp4":
+        import av
+
+        with av.open(str(movie)) as container:
+            assert sum(1 for _ in container.decode(video=0)) == 5
+    else:
+        with Image.open(movie) as image:
+            assert image.n_frames == 5

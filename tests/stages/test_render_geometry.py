@@ -1,0 +1,78 @@
+"""Shapes of strands, and the way from samples to pixels."""
+
+import numpy as np
+import pytest
+
+from pipeline.config.schema import Camera, Render
+from pipeline.render.geometry import choose_shape, drawn_width, projected_width, ribbons, smooth, taper
+from pipeline.render.target import BRIGHTEST, DECODED, encode
+from pipeline.render.tone import average, develop, to_srgb
+
+
+@pytest.mark.parametrize(("pixels", "shape"), [(0.2, "lines"), (0.99, "lines"), (1.5, "ribbons"), (3.5, "tubes")])
+def test_auto_draws_by_projected_width(pixels: float, shape: str) -> None:
+    assert choose_shape(Render(), pixels) == shape
+    assert choose_shape(Render(geometry="tubes"), pixels) == "tubes"
+
+
+def test_projected_width_is_that_of_a_pinhole_camera() -> None:
+    camera = Camera(position=(0, 0, 1), look_at=(0, 0, 0), field_of_view=2 * np.arctan(0.5))
+    width = projected_width(Render(size=(640, 480)), camera, 0.01, np.zeros(3))
+    print(f"1 cm at 1 m, 1 m high picture of 480 px: {width:.3f} px")
+    assert width == pytest.approx(4.8)
+
+
+def test_fewer_strands_are_drawn_wider_so_that_coverage_stays() -> None:
+    few, many = (drawn_width(Render(), count) for count in (25_000, 100_000))
+    assert few == pytest.approx(2 * many)
+    assert drawn_width(Render(), 1_000_000) == many
+    assert drawn_width(Render(width=1e-3), 10) == 1e-3
+
+
+def test_tips_thin_out_and_roots_do_not() -> None:
+    profile = taper(Render(taper=0.2), 32)
+    assert (profile[:25] == 1).all()
+    assert (np.diff(profile[25:]) < 0).all()
+    assert 0 < profile[-1] < 0.1
+
+
+def test_ribbons_face_the_eye_and_have_the_width_they_were_given() -> None:
+    rng = np.random.default_rng(1)
+    points = np.cumsum(rng.normal(size=(5, 9, 3)), axis=1).astype(np.float32)
+    eye = np.array([0.0, 0.0, 50.0])
+    widths = np.full((5, 9), 0.3, np.float32)
+    drawn = np.ones((5, 8), bool)
+    drawn[2, 3:5] = False
+    edges, triangles = ribbons(points, widths, eye, drawn)
+    side = edges[:, :, 1] - edges[:, :, 0]
+    print(f"widths {np.linalg.norm(side, axis=2).min():.6f} to {np.linalg.norm(side, axis=2).max():.6f}")
+    assert np.allclose(np.linalg.norm(side, axis=2), 0.3, rtol=1e-5)
+    assert np.abs(np.einsum("spk,spk->sp", side, points - eye)).max() < 1e-3
+    assert triangles.shape == (2 * (5 * 8 - 2), 3)
+    assert triangles.max() == edges[..., 0].size - 1
+
+
+def test_subdivision_keeps_the_points_and_is_exact_on_a_parabola() -> None:
+    t = np.linspace(-1, 1, 9)
+    points = np.stack([t, t**2, 0 * t], axis=-1)[None].astype(np.float32)
+    fine = smooth(points, 4)
+    worst = np.abs(fine[0, 4:-4, 1] - fine[0, 4:-4, 0] ** 2).max()
+    print(f"off the parabola by {worst:.1e}")
+    assert np.array_equal(fine[:, ::4], points)
+    assert worst < 1e-6
+
+
+def test_encoding_and_decoding_lose_less_than_half_a_step() -> None:
+    linear = np.geomspace(1e-3, BRIGHTEST, 200)
+    back = DECODED[encode(linear)]
+    step = 3 * np.cbrt(linear / BRIGHTEST) ** 2 * BRIGHTEST / 255
+    assert (np.abs(back - linear) <= 0.51 * step + 1e-7).all()
+    assert encode(np.array([100.0]))[0] == 255
+
+
+def test_samples_are_averaged_in_linear_light() -> None:
+    black_and_white = encode(np.indices((4, 4)).sum(axis=0)[..., None] % 2 * np.ones(3))
+    pixels = develop(black_and_white, 2, 1.0)
+    assert pixels.shape == (2, 2, 3)
+    assert np.abs(pixels.astype(int) - round(255 * float(to_srgb(np.array(0.5))))).max() <= 1
+    assert np.allclose(average(np.ones((6, 6, 3), np.float32), 3), 1)
