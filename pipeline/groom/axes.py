@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 def upright(points: NDArray[np.float64], up_axis: str) -> NDArray[np.float64]:
     """Turn points (N, 3) so that y is up; a file with z up looks along -y, as in Blender."""
     if up_axis == "z":
-        return points[:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
+        return np.asarray(points[:, [0, 2, 1]] * [1.0, 1.0, -1.0])
     if up_axis == "x":
-        return points[:, [1, 0, 2]] * np.array([-1.0, 1.0, 1.0])
+        return np.asarray(points[:, [1, 0, 2]] * [-1.0, 1.0, 1.0])
     return points

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
+from pipeline.groom.axes import upright
 
 _VTK_FORMATS = {".obj", ".ply", ".stl", ".vtp"}
 
@@ -37,7 +38,7 @@ def load_mesh(
         )
     points, faces = _welded(points.astype(np.float64), faces)
     _require_closed(path, faces)
-    points = _upright(points * unit_scale, up_axis)
+    points = upright(points * unit_scale, up_axis)
     if _volume(points, faces) < 0:
         faces = faces[:, ::-1]
     return points.astype(np.float32), np.ascontiguousarray(faces, np.int32)
@@ -125,15 +126,6 @@ def _loops(edges: NDArray[np.int64]) -> int:
     a, b = index.reshape(-1, 2).T
     graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(names), len(names)))
     return int(connected_components(graph, directed=False, return_labels=False))
-
-
-def _upright(points: NDArray[np.float64], up_axis: str) -> NDArray[np.float64]:
-    """Turn so that y is up; a file with z up looks along -y, as in Blender."""
-    if up_axis == "z":
-        return points[:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
-    if up_axis == "x":
-        return points[:, [1, 0, 2]] * np.array([-1.0, 1.0, 1.0])
-    return points
 
 
 def _volume(points: NDArray[np.float64], faces: NDArray[np.int64]) -> float:

@@ -47,7 +47,13 @@ class Locks:
         return np.asarray(nearest, np.int64)
 
     def gather(
-        self, bundle: Bundle, middles: Bundle, lock: NDArray[np.int64], keep: Vectors, seed: int, index: NDArray[np.int64]
+        self,
+        bundle: Bundle,
+        middles: Bundle,
+        lock: NDArray[np.int64],
+        keep: Vectors,
+        seed: int,
+        index: NDArray[np.int64],
     ) -> Vectors:
         """Points (N, P, 3) moved towards the middle's at the same arc length; `keep` (N,) scales the strength."""
         if self.count == 0:
@@ -56,8 +62,8 @@ class Locks:
         fraction = np.linspace(0, 1, p)
         along = fraction * bundle.length[:, None]
         target = _at(middles.points, along / middles.length[lock][:, None] * (p - 1), lock)
-        strength = self.clump.strength * keep * (0.6 + 0.4 * uniform(seed, index, self.salt))
-        weight = strength[:, None] * smoothstep(along / self.clump.over) * fraction**0.5
+        strength = self.clump.strength * keep * (0.85 + 0.15 * uniform(seed, index, self.salt))
+        weight = strength[:, None] * smoothstep(along / self.clump.over)
         return np.asarray(bundle.points + weight[..., None] * (target - bundle.points))
 
 

@@ -14,6 +14,8 @@ Points = NDArray[np.floating[Any]]
 _FRONT, _BACK = 0.10, -0.045  # [m] its ends, in z
 _FADE_FROM, _FADE_OVER = -0.08, 0.09  # [m] an off-centre parting bends to the middle towards the back
 _POINTS = 60
+_CROWDING, _CROWDED = 0.7, 0.015  # more roots at the parting than elsewhere, over this distance [m]
+_SWIRL, _SWIRLED = 1.1, 0.018  # [rad], [m]
 
 
 class PartingLine:
@@ -37,10 +39,18 @@ class PartingLine:
         v = p - np.stack([self._x(z), np.interp(z, self._z, self._y), z], axis=1)
         return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9))
 
-    def nearness(self, p: Points, reach: float) -> NDArray[np.float64]:
-        """1 on the parting to 0 at `reach` [m] from it."""
+    def crowding(self, p: Points) -> NDArray[np.float64]:
+        """Density of roots, 1 but for more beside the parting: hair flows away from it, and none lies over it."""
+        return np.asarray(1 + _CROWDING * (1 - smoothstep(self._distance(p) / _CROWDED)))
+
+    def swirl(self, p: Points) -> NDArray[np.float64]:
+        """Angle [rad] by which the flow turns about the parting's end on the crown: hair crosses there and covers it."""
+        to_end = np.hypot(p[:, 0] - self._x(np.array([_BACK])), p[:, 2] - _BACK)
+        return np.asarray(_SWIRL * np.exp(-((to_end / _SWIRLED) ** 2)))
+
+    def _distance(self, p: Points) -> NDArray[np.float64]:
         z = np.clip(p[:, 2], _BACK, _FRONT)
-        return np.asarray(1 - smoothstep(np.hypot(p[:, 0] - self._x(z), p[:, 2] - z) / reach))
+        return np.asarray(np.hypot(p[:, 0] - self._x(z), p[:, 2] - z))
 
     def _x(self, z: Points) -> NDArray[np.float64]:
         return np.asarray(self.offset * smoothstep((z - _FADE_FROM) / _FADE_OVER))

@@ -77,7 +77,7 @@ def grow(
     bend = path.bend * (0.8 + 0.4 * uniform(seed, index, _BEND))
     comb_length = path.comb * (0.85 + 0.3 * uniform(seed, index, _COMB))
     front = smoothstep((roots[:, 2] - 0.02) / 0.06)[:, None] * np.array([0, 0, path.sweep])
-    comb = _unit(_tangential(_flow(terrain, roots, normals) + front, normals))
+    comb = _unit(_flow(terrain, roots, normals) + _tangential(front, normals))
     t = _first_direction(groom, seed, index, normals, comb)
     p, points = roots, [roots]
     for k in range(1, int(longest(groom) / STEP) + 1):
@@ -86,7 +86,7 @@ def grow(
         sunk = smoothstep((_JAW - p[:, 1]) / _FADE)
         layer = _CLEARANCE + height * smoothstep(np.asarray(s / path.lift_over)) * (1 - 0.9 * sunk)
         fade = np.exp(-s / comb_length)[:, None]
-        flow = _unit(_tangential(_flow(terrain, p, m) + front, m))
+        flow = _unit(_flow(terrain, p, m) + _tangential(front, m))
         if k % _STRETCH == 1:
             noise = path.wander * _noise(seed, index, k // _STRETCH)
         target = _unit(fade * flow + (1 - fade) * _DOWN + noise)
@@ -144,11 +144,13 @@ def _first_direction(groom: Groom, seed: int, index: NDArray[np.int64], n: Vecto
 
 
 def _flow(terrain: Terrain, p: Vectors, n: Vectors) -> Vectors:
-    """Direction of the combing: away from the parting, or from the whorl and slightly around it."""
+    """Tangential unit direction of the combing: away from the parting, or from the whorl, and around its end."""
     if terrain.parting is not None:
-        return terrain.parting.away(p)
-    away = _unit(_tangential(-np.broadcast_to(scalp.whorl(), p.shape), n))
-    return np.asarray(np.cos(0.35) * away + np.sin(0.35) * np.cross(n, away))
+        away, swirl = terrain.parting.away(p), terrain.parting.swirl(p)[:, None]
+    else:
+        away, swirl = -np.broadcast_to(scalp.whorl(), p.shape), np.float64(0.35)
+    away = _unit(_tangential(away, n))
+    return np.asarray(np.cos(swirl) * away + np.sin(swirl) * np.cross(n, away))
 
 
 def _noise(seed: int, index: NDArray[np.int64], stretch: int) -> Vectors:

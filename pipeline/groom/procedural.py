@@ -5,6 +5,7 @@ the progressive order and are made first. So any chunking gives the same strands
 """
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,8 @@ class Style:
         skin = head.fitted_field
         parting = PartingLine(self.groom.parting, skin) if self.groom.parting.enabled else None
         self.terrain = Terrain(skin, skin.guarded(), parting)
-        found, _ = place_roots(self.groom.strands, self.seed, skin, head.density)
+        density = partial(_density, head, parting)
+        found, _ = place_roots(self.groom.strands, self.seed, skin, density)
         self.roots, self.normals = head.project(found)
         self.side = parting.side(self.roots) if parting else np.zeros(len(self.roots), np.int8)
         self.big = Locks(self.groom.big_clumps, self.roots, self.side, salt=70)
@@ -113,3 +115,8 @@ class Style:
             depth = np.maximum(lowest.ravel() - d, 0)
             points[:, 1:] = (p + depth[:, None] * n).reshape(points[:, 1:].shape)
         return points
+
+
+def _density(head: Head, parting: PartingLine | None, p: Vectors) -> Vectors:
+    """Relative density of roots at points on the skin."""
+    return head.density(p) * parting.crowding(p) if parting else head.density(p)

@@ -40,7 +40,11 @@ class Repairs:
             "pushed_out": "went through the skin, pushed out",
         }
         found = ((getattr(self, name), text) for name, text in told.items())
-        return [f"{len(which)} strands {text}: {_some(which)}" for which, text in found if which]
+        return [
+            f"{len(which)} strand{'s'[: len(which) - 1]} {text}: {_some(which)}"
+            for which, text in found
+            if which
+        ]
 
 
 def cleaned(strands: Ragged, repairs: Repairs) -> tuple[Ragged, NDArray[np.int64]]:

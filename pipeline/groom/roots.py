@@ -20,7 +20,7 @@ Points = NDArray[np.floating[Any]]
 
 _PLASTIC = 1.32471795724474602596  # the root of x^3 = x + 1
 _DISC = 0.9  # chart radius that holds the scalp
-_HIGHEST = 0.022  # [m^2] bound of density r^2 / cos
+_HIGHEST = 0.024  # [m^2] bound of density r^2 / cos
 _BATCH = 1 << 17
 _SALT = 1
 

@@ -131,6 +131,7 @@ class Skin {
             bound_ = near ? phi : bound_;
             const Lanes<float> depth = keep - phi;
             near &= depth > 0;
+            if (!any<float>(near)) break;
             t = select(near, tilted(t, whole, gradient, depth), t);
             near &= depth > kCurved;
         }

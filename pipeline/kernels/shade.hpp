@@ -69,7 +69,8 @@ inline FibrePoints gather(const StrandPoints &strands, size_t first, size_t coun
     const auto unit = [](Vec3<float> a) { return (1.0f / square_root<float>(dot(a, a) + 1e-30f)) * a; };
     p.tangent = unit(p.tangent);
     p.to_eye = unit({float(strands.eye[0]) - x.x, float(strands.eye[1]) - x.y, float(strands.eye[2]) - x.z});
-    p.x = in_voxels(light, x);
+    // Hair that is seen lies on the eye's side of its voxel, which is thicker than the layer that covers it
+    p.x = in_voxels(light, x) + splat(0.5f) * p.to_eye;
     p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
     p.cosine = square_root<float>(maximum<float>(1.0f - p.sine * p.sine, splat(1e-6f)));
     p.theta = 0.5f * kPi - arc_cosine(p.sine);

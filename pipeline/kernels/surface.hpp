@@ -34,6 +34,16 @@ inline Vec3<float> read16(const float *values, size_t first, size_t count) {
     return r;
 }
 
+RINGLET_INLINE Ints in_box(const DistanceField &field, const Vec3<float> &x) {
+    const Floats at[3] = {x.x, x.y, x.z};
+    Ints inside = at[0] == at[0];
+    for (int axis = 0; axis < 3; ++axis) {
+        const float low = float(field.origin[axis]), high = low + float(field.spacing) * (field.n[axis] - 1);
+        inside &= (at[axis] >= low) & (at[axis] <= high);
+    }
+    return inside;
+}
+
 /// Part of the light that the head lets past, marching its distance field from just above the skin. The nearest miss
 /// gives a penumbra (Quilez, Soft shadows in raymarched SDFs, 2010): the terminator and the chin's shadow are soft.
 __attribute__((noinline)) inline Floats past_head(const Occluder &head, const SkinPoints &p, const Vec3<float> &L) {
@@ -41,15 +51,17 @@ __attribute__((noinline)) inline Floats past_head(const Occluder &head, const Sk
     if (!head.field) return open;
     constexpr float sharpness = 12;
     const float step = float(head.field->spacing);
-    const int longest = std::max({head.field->n[0], head.field->n[1], head.field->n[2]});
     const Vec3<float> start = head.to_rest(p.x + splat(0.5f * step) * p.normal), toward = head.to_rest.turn(L);
     Floats way = splat(1.5f * step);
-    for (int march = 0; march < 96 && any<float>((open > 0.0f) & (way < 2 * step * longest)); ++march) {
+    Ints inside = way > 0.0f;
+    for (int march = 0; march < 256 && any<float>(inside & (open > 0.0f)); ++march) {
+        const Vec3<float> x = start + way * toward;
         Floats phi;
         Vec3<float> gradient;
-        sample(*head.field, start + way * toward, phi, gradient);
-        const Floats miss = clamp(sharpness * phi / way, 0, 1);
-        open = way < 2 * step * longest ? minimum<float>(open, miss) : open;
+        sample(*head.field, x, phi, gradient);
+        // A ray that left the field's box does not come back
+        inside &= in_box(*head.field, x);
+        open = inside ? minimum<float>(open, clamp(sharpness * phi / way, 0, 1)) : open;
         way += maximum<float>(phi, splat(0.5f * step));
     }
     return open;
@@ -72,6 +84,15 @@ inline Floats fibres(const Illumination &light, int l, Vec3<float> g) {
     return enters < leaves ? depths[towards] : splat(0.0f);
 }
 
+/// How far out of the grid: 0 inside, 1 from a sixteenth of its longest side on. There no hair hides the sky.
+RINGLET_INLINE Floats outside(const Illumination &light, const Vec3<float> &g) {
+    const Floats at[3] = {g.x, g.y, g.z};
+    Floats farthest = splat(0.0f);
+    for (int axis = 0; axis < 3; ++axis)
+        farthest = maximum<float>(farthest, maximum<float>(-0.5f - at[axis], at[axis] - (light.n[axis] - 0.5f)));
+    return clamp(farthest * (16.0f / std::max({light.n[0], light.n[1], light.n[2]})), 0, 1);
+}
+
 /// Sheen: Blinn-Phong with exponent 32 and Schlick's Fresnel at a skin's 3 %; times N.L.
 RINGLET_INLINE Floats sheen(const SkinPoints &p, const Vec3<float> &L, Floats facing) {
     const Vec3<float> middle = p.to_eye + L;
@@ -89,7 +110,11 @@ inline void light_skin(const SkinPoints &p, const Illumination &light, const Occ
     const Vec3<float> g = in_voxels(light, p.x) + p.normal;
     Floats around[8];
     read_surroundings(light, g, around);
-    for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * albedo[c] * minimum<float>(2.0f * around[c], splat(1.0f));
+    const Floats beyond = outside(light, g);
+    for (int c = 0; c < 3; ++c) {
+        const Floats seen = minimum<float>(2.0f * around[c], splat(1.0f));
+        radiance[c] = light.sky[c] * albedo[c] * (seen + beyond * (1.0f - seen));
+    }
     for (int l = 0; l < light.lights; ++l) {
         const Vec3<float> L = light.direction(l);
         const Floats facing = maximum<float>(dot(p.normal, L), splat(0.0f));

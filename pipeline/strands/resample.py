@@ -16,36 +16,37 @@ Vectors = NDArray[np.float64]
 
 _ROUNDS = 30
 _EQUAL = 3e-7  # of a segment's length; two of its ends make 6e-7
-_BLOCK = 512  # strands that stay in the processor's cache
+_BLOCK = 256  # strands that stay in the processor's cache
 _SMALLEST = 1e-12  # [m] keeps a step that does not exist from being divided by
 
 
 @dataclass(frozen=True)
 class SmoothCurve:
-    """A curve through the points of each strand."""
+    """A curve through the points of each strand: a cubic on each segment, in the distance u from the segment's start."""
 
-    points: Vectors
-    """(S, P, 3) [m]"""
     t: Vectors
     """(S, P) [m]: chord length from the root."""
-    M: Vectors
-    """(S, P, 3) [1/m]"""
+    cubic: Vectors
+    """(S, P-1, 4, 3): coefficients of 1, u, u^2, u^3."""
 
     @classmethod
-    def through(cls, points: Vectors) -> "SmoothCurve":
+    def through(cls, x: Vectors) -> "SmoothCurve":
         """The natural cubic spline through points (S, P, 3) [m]."""
-        t = arc_length(points)
-        return cls(points, t, _second_derivative(points, np.maximum(np.diff(t, axis=1), _SMALLEST)))
+        t = arc_length(x)
+        h = np.maximum(np.diff(t, axis=1), _SMALLEST)[..., None]
+        slope = np.diff(x, axis=1) / h
+        M = _second_derivative(slope, h)
+        start, end = M[:, :-1], M[:, 1:]
+        cubic = [x[:, :-1], slope - h / 6 * (2 * start + end), start / 2, (end - start) / (6 * h)]
+        return cls(t, np.stack(cubic, axis=2))
 
     def at(self, t: Vectors) -> Vectors:
         """Points (S, Q, 3) [m] at parameters (S, Q) [m], ascending along each strand."""
-        j = segments_at(self.t, t)
+        segment = segments_at(self.t, t)
         row = np.arange(len(t))[:, None]
-        h = np.maximum(self.t[row, j + 1] - self.t[row, j], _SMALLEST)[..., None]
-        b = np.clip((t - self.t[row, j])[..., None] / h, 0, 1)
-        a = 1 - b
-        bent = (a**3 - a) * self.M[row, j] + (b**3 - b) * self.M[row, j + 1]
-        return np.asarray(a * self.points[row, j] + b * self.points[row, j + 1] + h**2 / 6 * bent)
+        u = (t - self.t[row, segment])[..., None]
+        c = self.cubic[row, segment]
+        return np.asarray(c[:, :, 0] + u * (c[:, :, 1] + u * (c[:, :, 2] + u * c[:, :, 3])))
 
 
 def resampled(points: Vectors, count: int) -> Vectors:
@@ -61,27 +62,26 @@ def _equal_chords(points: Vectors, count: int) -> Vectors:
     """Chords of equal arcs differ where a strand bends: each round moves the parameters to where they would agree."""
     curve = SmoothCurve.through(points)
     fraction = np.linspace(0, 1, count)
-    t = curve.t[:, -1:] * fraction
+    t = np.asarray(curve.t[:, -1:] * fraction)
     for _ in range(_ROUNDS):
         found = curve.at(t)
         chords = arc_length(found)
         wanted = chords[:, -1:] * fraction
         if (np.abs(chords - wanted) <= _EQUAL * wanted[:, 1:2]).all():
             break
-        t = at_arc_length(t[..., None], chords, wanted)[..., 0]
+        t = np.asarray(at_arc_length(t[..., None], chords, wanted)[..., 0], np.float64)
     return found
 
 
-def _second_derivative(x: Vectors, h: Vectors) -> Vectors:
-    """M (S, P, 3), zero at both ends: h_{j-1} M_{j-1} + 2 (h_{j-1} + h_j) M_j + h_j M_{j+1} = 6 (x'_j - x'_{j-1})."""
-    slope = np.diff(x, axis=1) / h[..., None]
-    M = np.zeros_like(x)
-    count = x.shape[1]
-    ratio = np.zeros(x.shape[:2])
-    for j in range(1, count - 1):  # eliminate downwards
+def _second_derivative(slope: Vectors, h: Vectors) -> Vectors:
+    """M (S, P, 3) [1/m], zero at both ends: h_{j-1} M_{j-1} + 2 (h_{j-1} + h_j) M_j + h_j M_{j+1} = 6 (slope_j - slope_{j-1})."""
+    strands, segments, _ = slope.shape
+    M = np.zeros((strands, segments + 1, 3))
+    ratio = np.zeros((strands, segments, 1))
+    for j in range(1, segments):  # eliminate downwards
         pivot = 2 * (h[:, j - 1] + h[:, j]) - h[:, j - 1] * ratio[:, j - 1]
         ratio[:, j] = h[:, j] / pivot
-        M[:, j] = (6 * (slope[:, j] - slope[:, j - 1]) - h[:, j - 1, None] * M[:, j - 1]) / pivot[:, None]
-    for j in range(count - 3, 0, -1):  # substitute back
-        M[:, j] -= ratio[:, j, None] * M[:, j + 1]
+        M[:, j] = (6 * (slope[:, j] - slope[:, j - 1]) - h[:, j - 1] * M[:, j - 1]) / pivot
+    for j in range(segments - 1, 0, -1):  # substitute back
+        M[:, j] -= ratio[:, j] * M[:, j + 1]
     return M

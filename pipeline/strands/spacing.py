@@ -18,9 +18,13 @@ def arc_length(points: Points) -> NDArray[np.float64]:
 def segments_at(lengths: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.int64]:
     """Which segment (S, Q) of each strand holds the wanted arc lengths (S, Q) [m]; `lengths` is `arc_length(points)`."""
     strands, count = lengths.shape
-    offset = np.cumsum(lengths[:, -1] + 1.0)[:, None]  # strands in a row, so that one search serves all
-    right = np.searchsorted((lengths + offset).ravel(), (wanted + offset).ravel(), "right")
-    return np.clip(right.reshape(wanted.shape) - 1 - np.arange(strands)[:, None] * count, 0, count - 2)
+    row = np.arange(strands)[:, None]
+    whole = np.maximum(lengths[:, -1:], 1e-300)
+    along, sought = (
+        2 * row + at / whole for at in (lengths, wanted)
+    )  # in a row, so that one search serves all
+    left = np.searchsorted(along.ravel(), sought.ravel(), "right").reshape(wanted.shape) - 1 - row * count
+    return np.asarray(np.clip(left, 0, count - 2))
 
 
 def at_arc_length(points: Points, lengths: NDArray[np.float64], wanted: NDArray[np.float64]) -> Points:

@@ -28,6 +28,10 @@ head = "none"
 source = "swatch"
 [simulate]
 frames = 3
+theta = 0.6
+[[scene.lights]]
+direction = [0, 1, 0]
+irradiance = 4.0
 """
 
 
@@ -281,7 +285,7 @@ def test_validate_reports_each_case_and_fails_outside_the_tolerance(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = CaseResult("a law", "rotor", 1.001, 1.0, 0.01)
-    monkeypatch.setattr("pipeline.validation.run_cases", lambda quick: [right])
+    monkeypatch.setattr("pipeline.validation.run_cases", lambda _quick: [right])
     assert call(["validate", "--quick", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found == {
@@ -298,7 +302,7 @@ def test_validate_reports_each_case_and_fails_outside_the_tolerance(
         ],
     }
     wrong = CaseResult("another law", "none", float("nan"), 1.0, 0.01)
-    monkeypatch.setattr("pipeline.validation.run_cases", lambda quick: [right, wrong])
+    monkeypatch.setattr("pipeline.validation.run_cases", lambda _quick: [right, wrong])
     assert call(["validate"]) == 1
     assert "another law" in capsys.readouterr().out
     assert call(["validate", "no such"]) == 2

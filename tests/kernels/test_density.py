@@ -110,8 +110,8 @@ def test_optical_depth_agrees_with_a_ray_march(seed: int) -> None:
         np.float32
     )
     L = rng.normal(size=3)
-    L = (L / np.linalg.norm(L)).astype(np.float32)
-    swept = kernels.optical_depth(density[None], h, L[None])[0]
+    L /= np.linalg.norm(L)
+    swept = kernels.optical_depth(density[None], h, L[None].astype(np.float32))[0]
     starts = rng.integers(16, 48, (40, 3))
     steps = np.arange(0, 2 * n, 0.25)
     along = starts[:, None] + (steps[:, None] + 0.125) * L

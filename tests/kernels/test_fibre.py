@@ -62,7 +62,7 @@ def test_albedo_falls_with_absorption_as_published() -> None:
     sums = fibre.Scattering(0.3, 0.3, 0.0)
     sigma = np.array([0, 0.05, 0.2, 1, 4])
     cosine = np.ones(1)
-    lobes, means = fibre.far_field(cosine, np.array([0.0, np.pi]), sigma, 0.3)
+    _, means = fibre.far_field(cosine, np.array([0.0, np.pi]), sigma, 0.3)
     albedo = np.pi * means.sum((0, 2, 3))
     print("albedo", np.round(albedo, 4))
     assert albedo == pytest.approx([1, 0.912, 0.698, 0.211, 0.076], abs=6e-4)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline import cache, kernels
-from pipeline.bench.simulate import round_head
+from pipeline.bench.simulate import bench, round_head
 from pipeline.config.schema import Config, Keyframe, Motion, Simulate
 from pipeline.simulate import stage
 from pipeline.simulate.motion import head_motion, place, rotation_matrix
@@ -244,3 +244,12 @@ def test_the_energy_plot_is_reproducible(tmp_path: Path) -> None:
         pictures.append((experiment.folder / "energy.png").read_bytes())
     assert pictures[0] == pictures[1]
     assert pictures[0].startswith(b"\x89PNG")
+
+
+def test_the_bench_measures_what_it_promises() -> None:
+    figures = bench(guides=64, points=16, threads=1)
+    kernels.set_threads(0)
+    print(figures)
+    per_second = figures["frames_per_second"] * 10 * 64 * 16
+    assert per_second * figures["ns_per_point_step"] == pytest.approx(1e9, rel=1e-3)
+    assert figures["threads"] == 1

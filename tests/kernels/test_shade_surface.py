@@ -1,0 +1,144 @@
+"""Light on the head: Lambert, its own shadow, the shadow of hair; and one frame of `Lighting` as a whole."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipeline import kernels
+from pipeline.config.schema import Fibre, Light, Scene
+from pipeline.render.lighting import Lighting
+
+_F32 = NDArray[np.float32]
+_F64 = NDArray[np.float64]
+
+RADIUS = 0.09
+EYE = np.array([0.0, 0.1, 0.9])
+NOWHERE = np.eye(4)
+
+
+def sphere() -> kernels.DistanceField:
+    n, h = 81, 3e-3
+    x = (np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1) - n // 2) * h
+    return kernels.DistanceField(
+        (np.linalg.norm(x, axis=-1) - RADIUS).astype(np.float32), np.full(3, -(n // 2) * h), h
+    )
+
+
+def directions(count: int) -> _F64:
+    i = np.arange(count) + 0.5
+    z, turn = 1 - 2 * i / count, i * np.pi * (3 - np.sqrt(5))
+    return np.stack([np.sqrt(1 - z**2) * np.cos(turn), z, np.sqrt(1 - z**2) * np.sin(turn)], axis=-1)
+
+
+def fur(count: int, length: float, lowest: float = 0.0) -> tuple[_F32, _F32]:
+    """Strands that stand on the sphere's cap above this height, 0.2 mm wide."""
+    out = directions(2 * count)
+    out = out[out[:, 1] > lowest]
+    points = out[:, None] * (RADIUS + length * np.linspace(0, 1, 8))[:, None]
+    return points.astype(np.float32), np.full(points.shape[:2], 2e-4, np.float32)
+
+
+def lit(
+    scene: Scene, hair: tuple[_F32, _F32], head: kernels.DistanceField | None, **fibre: object
+) -> Lighting:
+    lighting = Lighting(scene, Fibre.model_validate({"glints": False} | fibre), 64)
+    points, widths = hair
+    lighting.begin(points.min((0, 1)).astype(float), points.max((0, 1)).astype(float), 2e-4)
+    lighting.add(points, widths)
+    lighting.finish(head, NOWHERE)
+    return lighting
+
+
+def skin(lighting: Lighting, normals: _F64, albedo: float = 0.5) -> _F32:
+    n = normals.astype(np.float32)
+    return lighting.shade_surface(n * np.float32(RADIUS), n, np.full_like(n, albedo), EYE)
+
+
+SUN = Scene(lights=(Light(direction=(0, 1, 0), irradiance=2.0),), environment=(0, 0, 0))
+SKY = Scene(lights=(), environment=(1, 1, 1))
+ONE_HAIR = fur(1, 0.02)
+
+
+def test_bare_head_is_lambertian_and_dark_on_the_far_side() -> None:
+    normals = directions(4000)
+    shaded = skin(lit(SUN, ONE_HAIR, sphere()), normals, 0.5)[:, 0]
+    lambert = 0.5 * 2.0 / np.pi * np.maximum(normals[:, 1], 0)
+    bright = (normals[:, 1] > 0.3) & (normals[:, 2] < 0)
+    error = np.abs(shaded[bright] / lambert[bright] - 1).max()
+    print(f"Lambert within {error:.1e} (sheen included, away from the eye)")
+    assert error < 0.05
+    assert shaded[normals[:, 1] < 0].max() == 0
+    assert (shaded >= 0).all()
+
+
+def test_head_shadows_itself_beyond_its_own_normals() -> None:
+    """A small sphere above another: light from above cannot reach the lower one's pole."""
+    n, h = 81, 4e-3
+    x = (np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1) - n // 2) * h
+    two = np.minimum(np.linalg.norm(x, axis=-1) - 0.05, np.linalg.norm(x - [0, 0.12, 0], axis=-1) - 0.03)
+    field = kernels.DistanceField(two.astype(np.float32), np.full(3, -(n // 2) * h), h)
+    lighting = lit(SUN, ONE_HAIR, field)
+    points = np.array([[0, 0.05, 0], [0.04, 0.03, 0]], np.float32)
+    shaded = lighting.shade_surface(points, points / np.float32(0.05), np.ones_like(points), EYE)
+    assert shaded[0].max() < 1e-3
+    assert shaded[1, 0] > 0.9 * 2.0 / np.pi * 0.6
+
+
+def test_hair_shadows_the_skin_by_its_loss() -> None:
+    top = np.array([[0.0, 1.0, 0.0], [0.1, 0.995, 0.0]])
+    normals = top / np.linalg.norm(top, axis=1, keepdims=True)
+    slanted = Scene(lights=(Light(direction=(1, 1, 0)),), environment=(0, 0, 0))
+    bare, dense = lit(slanted, ONE_HAIR, sphere()), lit(slanted, fur(20_000, 0.03), sphere())
+    through = skin(dense, normals) / skin(bare, normals)
+    print("light on the skin under brown hair", through[0])
+    assert (through < 0.65).all()
+    assert (np.diff(through, axis=1) < 0).all(), "brown hair takes more blue than red"
+
+
+def test_skin_under_open_sky_shows_its_albedo() -> None:
+    shaded = skin(lit(SKY, ONE_HAIR, sphere()), directions(500), 0.4)
+    print(f"under the sky {shaded.mean():.3f} of 0.4")
+    assert shaded.max() <= 0.4 + 1e-6
+    assert shaded.mean() > 0.3
+
+
+def test_hair_in_the_heads_shadow_is_dark() -> None:
+    points, widths = fur(4000, 0.03, lowest=0.8)
+    both = np.concatenate([points, points * np.array([1, -1, 1], np.float32)])
+    lighting = lit(SUN, (both, np.concatenate([widths, widths])), sphere())
+    key = np.arange(len(both), dtype=np.uint32)
+    shaded = lighting.shade(both, np.full(len(both), 0.4, np.float32), key, EYE)
+    upper, lower = shaded[: len(points)].mean(), shaded[len(points) :].mean()
+    print(f"lit {upper:.4f}, in the head's shadow {lower:.5f}")
+    assert lower < 0.1 * upper
+
+
+def test_white_hair_in_a_white_sky_disappears() -> None:
+    points, widths = fur(3000, 0.03)
+    lighting = lit(SKY, (points, widths), None, melanin=0.0)
+    key = np.arange(len(points), dtype=np.uint32)
+    shaded = lighting.shade(points, np.zeros(len(points), np.float32), key, EYE)
+    error = np.abs(shaded - 1).max()
+    print(f"furnace: {error:.1e}")
+    assert error < 1e-4
+
+
+def test_more_and_thinner_strands_look_the_same() -> None:
+    few, many = fur(2000, 0.03), fur(8000, 0.03)
+    means = []
+    for points, width in ((few[0], 4e-4), (many[0], 1e-4)):
+        lighting = lit(SUN, (points, np.full(points.shape[:2], width, np.float32)), sphere())
+        key = np.arange(len(points), dtype=np.uint32)
+        means.append(lighting.shade(points, np.full(len(points), 0.5, np.float32), key, EYE).mean((0, 1)))
+    print("few wide / many thin", means[0] / means[1])
+    assert means[0] / means[1] == pytest.approx(1, abs=0.03)
+
+
+def test_a_frame_is_finished_before_it_is_shaded() -> None:
+    lighting = Lighting(SUN, Fibre(), 64)
+    with pytest.raises(ValueError, match="begin"):
+        lighting.add(*ONE_HAIR)
+    with pytest.raises(ValueError, match="finish"):
+        lighting.shade(ONE_HAIR[0], np.zeros(1, np.float32), np.zeros(1, np.uint32), EYE)
+    with pytest.raises(ValueError, match="bounds"):
+        lighting.begin(np.full(3, np.inf), np.full(3, -np.inf), 1e-4)
