@@ -129,13 +129,13 @@ class Clump(Section):
 
 
 class Curl(Section):
-    radius: Annotated[Length, Field(ge=0)] = 0.0065
+    radius: Annotated[Length, Field(ge=0)] = 0.0075
     """Radius of the helix; 0 for straight hair."""
     radius_jitter: Fraction = 0.25
     """Relative spread of the radius from clump to clump."""
-    pitch: Annotated[Length, Field(gt=0)] = 0.062
+    pitch: Annotated[Length, Field(gt=0)] = 0.065
     """Length of one turn along the strand."""
-    pitch_jitter: Fraction = 0.2
+    pitch_jitter: Fraction = 0.12
     """Relative spread of the pitch from clump to clump."""
     flatness: Fraction = 0.45
     """Second axis of the helix as a fraction of the first: 0 is a flat wave, 1 a round curl."""
@@ -143,7 +143,7 @@ class Curl(Section):
     """Arc length at which the curl begins."""
     ramp: Annotated[Length, Field(gt=0)] = 0.08
     """Arc length over which it reaches its full radius."""
-    phase_spread: Fraction = 0.35
+    phase_spread: Fraction = 0.5
     """How much the phase differs from clump to clump: 0 is one wave over the whole head, 1 is random."""
     phase_jitter: Annotated[Angle, Field(ge=0)] = 0.15
     """Standard deviation of the phase inside a clump."""
@@ -152,9 +152,9 @@ class Curl(Section):
 
 
 class Frizz(Section):
-    amplitude: Annotated[Length, Field(ge=0)] = 0.0006
+    amplitude: Annotated[Length, Field(ge=0)] = 0.0004
     """Amplitude of the smooth noise on a strand."""
-    flyaways: Fraction = 0.015
+    flyaways: Fraction = 0.01
     """Fraction of strands that leave their layer, with three times the frizz."""
 
 
@@ -190,9 +190,9 @@ class Groom(Section):
     """How strands leave the skin and where they go."""
     cut: Cut = Cut()
     """How long they are."""
-    big_clumps: Clump = Clump(count=450, strength=0.5, over=0.12)
+    big_clumps: Clump = Clump(count=250, strength=0.75, over=0.16)
     """Large locks."""
-    small_clumps: Clump = Clump(count=4000, strength=0.55, over=0.07)
+    small_clumps: Clump = Clump(count=3000, strength=0.6, over=0.07)
     """Small locks inside them."""
     curl: Curl = Curl()
     """Waves and curls."""

@@ -92,4 +92,4 @@ def _mirror(v: Vectors, normal_: Vectors) -> Vectors:
 
 
 def _dot(a: Vectors, b: Vectors) -> Vectors:
-    return np.einsum("ij,ij->i", a, b)[:, None]
+    return np.asarray(np.einsum("ij,ij->i", a, b)[:, None])

@@ -15,9 +15,7 @@ _PREFIX = 20_000  # strands that are looked at: any prefix is a valid groom
 _ROUNDS = 12
 
 
-def choose_guides(
-    points: NDArray[np.float32], side: NDArray[np.int8], count: int
-) -> NDArray[np.uint32]:
+def choose_guides(points: NDArray[np.float32], side: NDArray[np.int8], count: int) -> NDArray[np.uint32]:
     """Indices (G,) of the guides among strands (S, P, 3) [m], ascending; all strands when there are few."""
     if count >= len(points):
         return np.arange(len(points), dtype=np.uint32)
@@ -45,7 +43,7 @@ def _nearest_strands(x: NDArray[np.float64], centres: NDArray[np.float64]) -> ND
     tree = cKDTree(x)
     _, wanted = tree.query(centres, k=min(8, len(x)))
     taken: dict[int, None] = {}
-    for choices in wanted:
+    for choices in np.asarray(wanted):
         free = next((int(i) for i in choices if int(i) not in taken), None)
         if free is not None:
             taken[free] = None

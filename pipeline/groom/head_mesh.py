@@ -25,7 +25,7 @@ def load_mesh(
     not finite, indices out of range, a mesh without triangles, and a mesh with holes or with edges of three faces.
     """
     if not path.is_file():
-        raise InputError(f"{path}: no such mesh; scene.head takes a path, \"builtin\" or \"none\"")
+        raise InputError(f'{path}: no such mesh; scene.head takes a path, "builtin" or "none"')
     points, faces = _read(path)
     if not np.isfinite(points).all():
         bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
@@ -51,7 +51,8 @@ def point_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> 
     normals = np.stack(
         [np.bincount(triangles.ravel(), np.repeat(area[:, k], 3), len(points)) for k in range(3)], axis=1
     )
-    return (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)).astype(np.float32)
+    length = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return np.asarray(normals / length, np.float32)
 
 
 def _read(path: Path) -> tuple[NDArray[Any], NDArray[np.int64]]:
@@ -94,10 +95,14 @@ def _fans(polygons: NDArray[Any]) -> NDArray[np.int64]:
     return np.concatenate([p[:, [0, k, k + 1]] for k in range(1, p.shape[1] - 1)])
 
 
-def _welded(points: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _welded(
+    points: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Merge points that lie within a millionth of the mesh's size; drop triangles that collapse and lone points."""
     cell = max(float(np.ptp(points[faces.ravel()], axis=0).max()), 1e-30) * 1e-6
-    _, first, merged = np.unique(np.round(points / cell).astype(np.int64), axis=0, return_index=True, return_inverse=True)
+    _, first, merged = np.unique(
+        np.round(points / cell).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
     faces = merged.reshape(-1)[faces]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
@@ -125,7 +130,7 @@ def _loops(edges: NDArray[np.int64]) -> int:
     names, index = np.unique(edges, return_inverse=True)
     a, b = index.reshape(-1, 2).T
     graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(names), len(names)))
-    return int(connected_components(graph, directed=False, return_labels=False))
+    return int(connected_components(graph, directed=False)[0])
 
 
 def _volume(points: NDArray[np.float64], faces: NDArray[np.int64]) -> float:

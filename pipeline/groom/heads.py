@@ -82,15 +82,15 @@ def make_head(config: Config) -> Head | None:
 
 def _mannequin(spacing: float, tone: str) -> Head:
     from pipeline.groom.head import distance, skin, surface
+    from pipeline.groom.mesh_distance import distance_grid
 
     points, triangles, normals = surface.contour()
-    values, origin = surface.collision_grid(spacing)
     return Head(
         skin=Skin(points, triangles, normals, skin.albedo(points, normals, tone)),
-        field=Field(values, origin, spacing),
+        field=distance_grid(points, triangles, spacing),
         scale=1.0,
         offset=np.zeros(3),
-        project=lambda p: distance.foot(p, reach=surface.REACH),
+        project=lambda p: distance.foot(p, steps=1, reach=surface.REACH),
     )
 
 

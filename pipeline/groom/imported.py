@@ -10,7 +10,7 @@ from pipeline.config.schema import Config
 from pipeline.errors import InputError
 from pipeline.groom.axes import upright
 from pipeline.groom.heads import Head
-from pipeline.groom.repairs import Repairs, cleaned, pushed_out, turned
+from pipeline.groom.repairs import LONGEST, SHORTEST, Repairs, cleaned, pushed_out, turned
 from pipeline.progress import say
 from pipeline.strands.formats import Ragged, read_groom
 from pipeline.strands.random import hashed
@@ -39,7 +39,10 @@ def load(config: Config, head: Head | None) -> tuple[Strands, dict[str, Any]]:
     upright_points = upright(file.points * groom.unit_scale, groom.up_axis)
     kept, index = cleaned(Ragged(upright_points, file.counts, file.pins), repairs)
     if not len(kept):
-        raise InputError(f"{path}: none of its {len(file)} strands has a shape; check groom.unit_scale")
+        raise InputError(
+            f"{path}: none of its {len(file)} strands has a length from {1e3 * SHORTEST:g} mm to {LONGEST:g} m; "
+            "check groom.unit_scale"
+        )
     points, pins = evenly_spaced(kept, groom.points)
     if head is not None:
         points, pins = _on_the_head(points, pins, index, head, repairs, path)

@@ -74,7 +74,7 @@ def _at(points: Vectors, place: Vectors, which: NDArray[np.int64]) -> Vectors:
     i = np.minimum(place.astype(np.int64), last - 1)
     u = (place - i)[..., None]
     row = which[:, None]
-    return points[row, i] * (1 - u) + points[row, i + 1] * u
+    return np.asarray(points[row, i] * (1 - u) + points[row, i + 1] * u)
 
 
 def _features(roots: Vectors, side: NDArray[Any]) -> Vectors:

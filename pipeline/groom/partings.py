@@ -14,6 +14,8 @@ Points = NDArray[np.floating[Any]]
 _FRONT, _BACK = 0.10, -0.045  # [m] its ends, in z
 _FADE_FROM, _FADE_OVER = -0.08, 0.09  # [m] an off-centre parting bends to the middle towards the back
 _POINTS = 60
+_APART = 3e-3  # [m] strands on the parting fall to their side as if they stood this far from it
+_APART_FROM = 0.03  # [m] but not at its end on the crown
 _CROWDING, _CROWDED = 0.7, 0.015  # more roots at the parting than elsewhere, over this distance [m]
 _SWIRL, _SWIRLED = 1.1, 0.018  # [rad], [m]
 
@@ -33,11 +35,13 @@ class PartingLine:
         """+1 for points to the left of the parting, -1 for those to its right."""
         return np.where(p[:, 0] > self._x(p[:, 2]), 1, -1).astype(np.int8)
 
-    def away(self, p: Points) -> NDArray[np.float64]:
-        """Unit vectors from the parting's point beside each p."""
+    def away(self, p: Points, side: NDArray[np.int8]) -> NDArray[np.float64]:
+        """Unit vectors from the parting's point beside each p, for strands that keep to their side of it."""
         z = np.clip(p[:, 2], _BACK, _FRONT)
         v = p - np.stack([self._x(z), np.interp(z, self._z, self._y), z], axis=1)
-        return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9))
+        apart = side * np.maximum(side * v[:, 0], _APART)
+        v[:, 0] += smoothstep((p[:, 2] - _BACK) / _APART_FROM) * (apart - v[:, 0])
+        return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
 
     def crowding(self, p: Points) -> NDArray[np.float64]:
         """Density of roots, 1 but for more beside the parting: hair flows away from it, and none lies over it."""

@@ -28,6 +28,7 @@ _CLEARANCE = 0.8e-3  # [m] of the lowest layer
 _DOWN = np.array([0.0, -1.0, 0.0])
 _JAW, _FADE = -0.07, 0.05  # [m] height below which layers sink, and over which
 _LONGEST = 0.42  # [m]
+_WHORL = 0.35  # [rad] turn of the flow about the whorl where there is no parting
 _FLYAWAY_RISE = 0.3  # most that a flyaway rises above its layer, in units of the lift
 _STRETCH = 8  # steps that a wandering direction lasts
 _TILT, _DIRECTION, _LAYER, _FLYAWAY, _RISE, _BEND, _COMB, _WANDER = 30, 20, 40, 41, 42, 43, 44, 50  # salts
@@ -40,6 +41,10 @@ class Terrain:
     skin: Field
     wall: Field
     parting: PartingLine | None
+
+    def side(self, roots: Vectors) -> NDArray[np.int8]:
+        """Side of the parting (N,) that roots lie on: 1 left, -1 right, 0 where there is none."""
+        return self.parting.side(roots) if self.parting else np.zeros(len(roots), np.int8)
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,8 @@ def grow(
     bend = path.bend * (0.8 + 0.4 * uniform(seed, index, _BEND))
     comb_length = path.comb * (0.85 + 0.3 * uniform(seed, index, _COMB))
     front = smoothstep((roots[:, 2] - 0.02) / 0.06)[:, None] * np.array([0, 0, path.sweep])
-    comb = _unit(_flow(terrain, roots, normals) + _tangential(front, normals))
+    side = terrain.side(roots)
+    comb = _unit(_flow(terrain, side, roots, normals) + _tangential(front, normals))
     t = _first_direction(groom, seed, index, normals, comb)
     p, points = roots, [roots]
     for k in range(1, int(longest(groom) / STEP) + 1):
@@ -86,7 +92,7 @@ def grow(
         sunk = smoothstep((_JAW - p[:, 1]) / _FADE)
         layer = _CLEARANCE + height * smoothstep(np.asarray(s / path.lift_over)) * (1 - 0.9 * sunk)
         fade = np.exp(-s / comb_length)[:, None]
-        flow = _unit(_flow(terrain, p, m) + _tangential(front, m))
+        flow = _unit(_flow(terrain, side, p, m) + _tangential(front, m))
         if k % _STRETCH == 1:
             noise = path.wander * _noise(seed, index, k // _STRETCH)
         target = _unit(fade * flow + (1 - fade) * _DOWN + noise)
@@ -132,7 +138,7 @@ def _arc_to_level(height: Vectors, level: Vectors) -> Vectors:
     row = np.arange(len(height))
     y0, y1 = height[row, after - 1], height[row, after]
     part = np.clip((y0 - level) / np.maximum(y0 - y1, 1e-9), 0, 1)
-    return np.where(below.any(axis=1), (after - 1 + part) * STEP, np.inf)
+    return np.asarray(np.where(below.any(axis=1), (after - 1 + part) * STEP, np.inf))
 
 
 def _first_direction(groom: Groom, seed: int, index: NDArray[np.int64], n: Vectors, comb: Vectors) -> Vectors:
@@ -143,12 +149,12 @@ def _first_direction(groom: Groom, seed: int, index: NDArray[np.int64], n: Vecto
     return _unit(np.cos(tilt) * n + np.sin(tilt) * _unit(comb + path.direction_jitter * jitter))
 
 
-def _flow(terrain: Terrain, p: Vectors, n: Vectors) -> Vectors:
+def _flow(terrain: Terrain, side: NDArray[np.int8], p: Vectors, n: Vectors) -> Vectors:
     """Tangential unit direction of the combing: away from the parting, or from the whorl, and around its end."""
     if terrain.parting is not None:
-        away, swirl = terrain.parting.away(p), terrain.parting.swirl(p)[:, None]
+        away, swirl = terrain.parting.away(p, side), terrain.parting.swirl(p)[:, None]
     else:
-        away, swirl = -np.broadcast_to(scalp.whorl(), p.shape), np.float64(0.35)
+        away, swirl = -np.broadcast_to(scalp.whorl(), p.shape), np.full((1, 1), _WHORL)
     away = _unit(_tangential(away, n))
     return np.asarray(np.cos(swirl) * away + np.sin(swirl) * np.cross(n, away))
 
@@ -162,7 +168,7 @@ def _tangential(v: Vectors, n: Vectors) -> Vectors:
 
 
 def _dot(a: Vectors, b: Vectors) -> Vectors:
-    return np.einsum("ij,ij->i", a, b)[:, None]
+    return np.asarray(np.einsum("ij,ij->i", a, b)[:, None])
 
 
 def _unit(v: Vectors) -> Vectors:

@@ -4,8 +4,11 @@ A strand depends on the seed, its index and the middles of its clumps alone; the
 the progressive order and are made first. So any chunking gives the same strands, and memory does not grow.
 """
 
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +27,14 @@ from pipeline.strands.strands import Strands
 Vectors = NDArray[np.float64]
 
 CHUNK = 8192
+_WORKERS = 2
 _CLEARANCE = 0.8e-3  # [m] between strands and skin
 _FLYAWAY_CLUMPING = 0.15
 _KEY, _UNEVEN = 7, 63  # salts
 
 
 class Style:
-    """The strands of a config on a head; `strands(first, last)` makes any of them."""
+    """The strands of a config on a head; `strands(first, count)` makes any of them."""
 
     def __init__(self, config: Config, head: Head) -> None:
         self.groom, self.seed, self.head = config.groom, config.seed, head
@@ -39,21 +43,26 @@ class Style:
         self.terrain = Terrain(skin, skin.guarded(), parting)
         density = partial(_density, head, parting)
         found, _ = place_roots(self.groom.strands, self.seed, skin, density)
-        self.roots, self.normals = head.project(found)
-        self.side = parting.side(self.roots) if parting else np.zeros(len(self.roots), np.int8)
+        self.roots, self.normals = (np.asarray(a, np.float64) for a in head.project(found))
+        self.side = self.terrain.side(self.roots)
         self.big = Locks(self.groom.big_clumps, self.roots, self.side, salt=70)
         self.small = Locks(self.groom.small_clumps, self.roots, self.side, salt=71)
         self._big_middles = self._smooth(np.arange(self.big.count))
         self._small_middles = self._in_locks(np.arange(self.small.count))
 
     def chunks(self) -> Iterator[Strands]:
-        """All strands, in order."""
-        for first in range(0, len(self.roots), CHUNK):
-            yield self.strands(first, min(first + CHUNK, len(self.roots)))
+        """All strands, in order; a few chunks are made at once, and no more are kept."""
+        todo = iter(range(0, len(self.roots), CHUNK))
+        with ThreadPoolExecutor(_WORKERS) as pool:
+            made = deque(pool.submit(self.strands, i) for i in islice(todo, _WORKERS))
+            while made:
+                strands = made.popleft().result()
+                made.extend(pool.submit(self.strands, i) for i in islice(todo, 1))
+                yield strands
 
-    def strands(self, first: int, last: int) -> Strands:
-        """Strands first .. last-1, in world coordinates."""
-        index = np.arange(first, last)
+    def strands(self, first: int, count: int = CHUNK) -> Strands:
+        """Up to `count` strands from `first` on, in world coordinates."""
+        index = np.arange(first, min(first + count, len(self.roots)))
         roots, side = self.roots[index], self.side[index]
         own = traits(self.groom, self.seed, index)
         keep = np.where(own.flyaway, _FLYAWAY_CLUMPING, 1.0)
@@ -65,7 +74,7 @@ class Style:
         points = curled(self.groom.curl, self.seed, index, lock, points, along, comb)
         points = frizzed(self.groom.frizz, self.seed, index, own.flyaway, points, along)
         points[:, 0] = roots
-        points = equal_spacing(self._outside(points), self.groom.points)
+        points = np.asarray(equal_spacing(self._outside(points), self.groom.points), np.float64)
         return Strands(
             points=self.head.to_world(points).astype(np.float32),
             pins=np.tile(np.array([2, 0], np.uint8), (len(index), 1)),
@@ -119,4 +128,5 @@ class Style:
 
 def _density(head: Head, parting: PartingLine | None, p: Vectors) -> Vectors:
     """Relative density of roots at points on the skin."""
-    return head.density(p) * parting.crowding(p) if parting else head.density(p)
+    crowding = parting.crowding(p) if parting else 1.0
+    return np.asarray(head.density(p) * crowding, np.float64)

@@ -1,8 +1,8 @@
 """What real groom files need before they can be simulated, each repair reported by strand index.
 
-Strands with points that are not finite, or of almost no length, are dropped; repeated points are merged; a strand
-whose root lies much farther from the head than its tip is turned round; strands that start inside the head are
-pushed out of it, so that contact does not throw them out.
+Strands with points that are not finite, of almost no length or of far too much are dropped; repeated points
+are merged; a strand whose root lies much farther from the head than its tip is turned round; strands that
+start inside the head are pushed out of it, so that contact does not throw them out.
 """
 
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from pipeline.groom.head_field import Field
 from pipeline.strands.formats import Ragged
 from pipeline.strands.resample import resampled
 
-_SHORTEST = 1e-3  # [m] strands below this have no shape
+SHORTEST, LONGEST = 1e-3, 10.0  # [m] strands below have no shape, and those above are no hair
 _REPEATED = 1e-6  # of a strand's length: points this near are one
 _TURNED = 0.01  # [m] how much farther than its tip a root may be from the head
 _CLEARANCE = 0.8e-3  # [m] between strands and skin
@@ -26,6 +26,7 @@ class Repairs:
 
     not_finite: list[int] = field(default_factory=list)
     no_length: list[int] = field(default_factory=list)
+    too_long: list[int] = field(default_factory=list)
     merged_points: list[int] = field(default_factory=list)
     turned_round: list[int] = field(default_factory=list)
     pushed_out: list[int] = field(default_factory=list)
@@ -35,6 +36,7 @@ class Repairs:
         told = {
             "not_finite": "dropped, with points that are not finite",
             "no_length": "dropped, with almost no length",
+            "too_long": f"dropped, longer than {LONGEST:g} m",
             "merged_points": "had repeated points, merged",
             "turned_round": "had root and tip swapped, turned round",
             "pushed_out": "went through the skin, pushed out",
@@ -56,12 +58,13 @@ def cleaned(strands: Ragged, repairs: Repairs) -> tuple[Ragged, NDArray[np.int64
     step[1:] = np.linalg.norm(np.diff(np.where(bad[owner, None], 0, strands.points), axis=0), axis=1)
     step[strands.first[strands.counts > 0]] = 0
     length = np.bincount(owner, step, count)
-    short = ~bad & (length < _SHORTEST)
+    short, long = ~bad & (length < SHORTEST), length > LONGEST
     repeated = (step <= _REPEATED * length[owner]) & (np.arange(len(owner)) > strands.first[owner])
-    kept = ~bad & ~short
+    kept = ~(bad | short | long)
     merged = kept & (np.bincount(owner, repeated, count) > 0)
-    for name, found in (("not_finite", bad), ("no_length", short), ("merged_points", merged)):
-        getattr(repairs, name).extend(np.flatnonzero(found).tolist())
+    found = {"not_finite": bad, "no_length": short, "too_long": long, "merged_points": merged}
+    for name, which in found.items():
+        getattr(repairs, name).extend(np.flatnonzero(which).tolist())
     left = kept[owner] & ~repeated
     counts = np.bincount(owner[left], minlength=count)[kept]
     return Ragged(strands.points[left], counts, strands.pins[kept]), np.flatnonzero(kept)

@@ -1,11 +1,11 @@
 """Stage 1, the groom: reads the config and what it names, writes groom.h5.
 
-    strands/points (S, P, 3) f32 [m]   rest shapes in the head's rest pose, equal spacing; any prefix is a valid groom
-    strands/normal (S, 3) f32          scalp normal at the root
-    strands/side (S,) i8, key (S,) u32, pins (S, 2) u8
-    guides/strand (G,) u32             which strands are simulated, ascending
-    guides/offset (G, P) f32 [m]       distance that their points keep from the skin
-    head/points, triangles, normals, albedo, distance, origin, spacing     unless scene.head = "none"
+strands/points (S, P, 3) f32 [m]   rest shapes in the head's rest pose, equal spacing; any prefix is a valid groom
+strands/normal (S, 3) f32          scalp normal at the root
+strands/side (S,) i8, key (S,) u32, pins (S, 2) u8
+guides/strand (G,) u32             which strands are simulated, ascending
+guides/offset (G, P) f32 [m]       distance that their points keep from the skin
+head/points, triangles, normals, albedo, distance, origin, spacing     unless scene.head = "none"
 """
 
 from collections.abc import Iterable
@@ -21,6 +21,8 @@ from pipeline.groom.procedural import Style
 from pipeline.groom.swatch import swatch
 from pipeline.progress import say, track
 from pipeline.strands.strands import Strands
+
+_HELD_UP = 0.8  # part of its groomed distance from the skin that a guide keeps
 
 
 def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
@@ -41,19 +43,23 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
 def contact_offset(config: Config, head: Head | None, guides: NDArray[np.float32]) -> NDArray[np.float32]:
     """Distance [m] that guide points (G, P, 3) keep from the skin, (G, P).
 
-    It is the groomed distance between `contact.offset` and `contact.layer`: the hair below holds a guide up. From the
-    held root on it grows at most half as fast as the strand is long (a root of a real groom may lie below the
-    skin), and it shrinks only slowly, so that neighbours of a point agree.
+    It is most of the groomed distance, up to `contact.layer`: the hair below holds a guide up. Points groomed below
+    the skin are to come out of it to `contact.offset`. From point to point, and from the held root on, it changes at
+    most half as fast as the strand is long: what cannot be reached without stretching has no solution.
     """
     contact = config.simulate.contact
     if head is None:
         return np.full(guides.shape[:2], contact.offset, np.float32)
     groomed = head.field.distance(guides.reshape(-1, 3)).reshape(guides.shape[:2])
-    spacing = np.linalg.norm(np.diff(guides, axis=1), axis=2).mean(axis=1)
-    reach = groomed[:, 1:2] + 0.5 * spacing[:, None] * (np.arange(guides.shape[1]) - 1)
-    offset = np.minimum(np.clip(groomed, contact.offset, max(contact.layer, contact.offset)), reach)
-    for j in range(1, offset.shape[1]):
-        offset[:, j] = np.maximum(offset[:, j], offset[:, j - 1] - 0.25 * spacing)
+    offset = np.clip(_HELD_UP * groomed, 0, max(contact.layer, contact.offset))
+    offset = np.where(groomed > 0, offset, contact.offset)
+    offset[:, :2] = groomed[:, :2]
+    step = 0.5 * np.linalg.norm(np.diff(guides, axis=1), axis=2).mean(axis=1)
+    last = guides.shape[1] - 1
+    for j in range(1, last + 1):
+        offset[:, j] = np.minimum(offset[:, j], offset[:, j - 1] + step)
+    for j in range(last - 1, 1, -1):
+        offset[:, j] = np.minimum(offset[:, j], offset[:, j + 1] + step)
     return offset.astype(np.float32)
 
 

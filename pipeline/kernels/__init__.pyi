@@ -455,3 +455,22 @@ def shade_surface(
         loss: (3,) float32, part of the light that one fibre takes away, for R, G, B.
 
     """
+
+# --- pixels (develop.hpp) ---------------------------------------------------------------------------
+
+def develop(
+    samples: NDArray[np.uint8], per_side: int, decode: _F32, encode: NDArray[np.uint8], scale: float
+) -> NDArray[np.uint8]:
+    """Pixels (H, W, 3) uint8 of samples (H n, W n, 3) uint8, averaged over n x n = per_side x per_side.
+
+    Args:
+        samples: encoded samples.
+        per_side: n >= 1.
+        decode: (256,) float32, linear value of each byte.
+        encode: (K,) uint8, byte for scale * linear value, rounded down; values beyond the last entry take it.
+        scale: >= 0.
+
+    Raises:
+        ValueError: shapes that do not fit.
+
+    """

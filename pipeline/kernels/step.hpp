@@ -76,10 +76,17 @@ template <class Real> class Stepper {
     /// One step, or two half steps for the lanes in which it fails (contact.md step f).
     void advance(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to, M wanted, int depth) {
         const Tally<Real> before = tally;
-        M failed = attempt(interval, from, to, wanted) & ~hopeless_;
-        if (depth == kHalvings) hopeless_ |= failed;
-        if (!any<Real>(failed) || depth == kHalvings) return;
+        M failed = attempt(interval, from, to, wanted);
+        const M again = failed & hopeless_; // no use to halve again in this step
+        stand_still(from, to, again, Real(interval.dt));
+        failed &= ~again;
+        if (!any<Real>(failed)) return;
         keep_accepted(before, failed);
+        if (depth == kHalvings) {
+            hopeless_ |= failed;
+            stand_still(from, to, failed, Real(interval.dt));
+            return;
+        }
         Motion<Real> &middle = halves_[2 * depth], &end = halves_[2 * depth + 1];
         advance(interval.halved(false), from, middle, failed, depth + 1);
         advance(interval.halved(true), middle, end, failed, depth + 1);
@@ -89,6 +96,20 @@ template <class Real> class Stepper {
             to.T[i] = select<Real>(failed, end.T[i], to.T[i]);
             to.touch[i] = select<Real>(failed, end.touch[i], to.touch[i]);
         }
+    }
+
+    /// What no step can take, because contacts leave no room for the strand, keeps its shape and follows its root:
+    /// lengths hold, the depth is what it is and `Report::depth` tells it.
+    void stand_still(const Motion<Real> &from, Motion<Real> &to, M lanes, Real dt) {
+        if (!any<Real>(lanes)) return;
+        const L per_second = splat(Real(1) / dt);
+        for (int i = std::max(block.first, 1); i < block.P; ++i) {
+            M moved = lanes & (block.free[i] > 0);
+            to.x[i] = select(moved, to.x[i - 1] + (from.x[i] - from.x[i - 1]), to.x[i]);
+            to.v[i] = select(moved, per_second * (to.x[i] - from.x[i]), to.v[i]);
+        }
+        for (int j = 0; j < block.P - 1; ++j) to.T[j] = select<Real>(lanes, from.T[j], to.T[j]);
+        tally.strain = maximum<Real>(tally.strain, select<Real>(lanes, lengths_.strain(block, to.x), L{}));
     }
 
     /// A failed attempt is not a step's end: its strain and depth do not count.

@@ -19,7 +19,7 @@ from pipeline.render.geometry import (
 )
 from pipeline.render.lighting import Lighting
 from pipeline.render.target import Target
-from pipeline.render.tone import develop
+from pipeline.render.tone import before_roll_off, develop
 from pipeline.strands.expand import Expansion
 from pipeline.strands.random import normal
 
@@ -73,8 +73,8 @@ class FrameRenderer:
         self.melanin = np.clip(render.hair.melanin + jitter, 0, 0.99).astype(np.float32)
         self.lighting = Lighting(scene, render.hair, render.grid)
         across, down = (side * render.samples for side in render.size)
-        # Exposure applies to what is lit; the background is meant as it is written.
-        background = np.array(scene.background) / render.exposure
+        # Exposure and roll-off apply to what is lit; the background is meant as it is written.
+        background = before_roll_off(np.array(scene.background)) / render.exposure
         self.target = Target(across, down, tuple(background.tolist()))
 
     def shape(self, moment: Moment) -> tuple[Shape, float]:

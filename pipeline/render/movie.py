@@ -26,7 +26,11 @@ def write_movie(frames: Sequence[Path], folder: Path, fps: float) -> Path:
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         stream.width, stream.height = _even(_load(frames[0])).size
         stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": "17", "preset": "medium", "threads": "1"}  # one thread: the same bytes every time
+        stream.options = {
+            "crf": "17",
+            "preset": "medium",
+            "threads": "1",
+        }  # one thread: the same bytes every time
         with track("movie", len(frames)) as bar:
             for frame in frames:
                 for packet in stream.encode(av.VideoFrame.from_image(_even(_load(frame)))):

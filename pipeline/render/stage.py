@@ -70,9 +70,7 @@ def _processor() -> str:
     except OSError:
         return platform.machine()
     wanted = ("vendor_id", "cpu family", "model\t", "model name")
-    return " ".join(
-        dict.fromkeys(line.split(":", 1)[1].strip() for line in lines if line.startswith(wanted))
-    )
+    return " ".join(dict.fromkeys(line.split(":", 1)[1].strip() for line in lines if line.startswith(wanted)))
 
 
 class _Write:

@@ -3,25 +3,34 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline import kernels
 from pipeline.render.target import DECODED
 
-_STEPS = 1 << 14
+SHOULDER, WHITE = 0.6, 1.4
+"""Linear values where compression of highlights begins, and that become 1."""
+_STEPS = 1 << 15
 
 
 def develop(samples: NDArray[np.uint8], per_side: int, exposure: float) -> NDArray[np.uint8]:
-    """Pixels (H, W, 3) sRGB of encoded samples (H n, W n, 3), averaged over n x n in linear light."""
-    linear = average(DECODED[samples], per_side)
-    index = np.minimum(linear * np.float32(exposure * (_STEPS - 1)), _STEPS - 1).astype(np.int32)
-    return np.asarray(_SRGB[index])
+    """Pixels (H, W, 3) sRGB of encoded samples (H n, W n, 3), averaged over n x n in linear light.
+
+    Highlights roll off instead of clipping, see `roll_off`.
+    """
+    flat = np.ascontiguousarray(samples)
+    return kernels.develop(flat, per_side, DECODED, _SRGB, exposure * (_STEPS - 1) / WHITE)
 
 
-def average(linear: NDArray[np.float32], per_side: int) -> NDArray[np.float32]:
-    """Mean over blocks of n x n of (H n, W n, 3)."""
-    if per_side == 1:
-        return linear
-    rows = np.add.reduce([linear[i::per_side] for i in range(per_side)])
-    blocks = np.add.reduce([rows[:, i::per_side] for i in range(per_side)])
-    return np.asarray(blocks / np.float32(per_side**2), np.float32)
+def roll_off(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Compress 0.6 .. 1.4 to 0.6 .. 1 by a parabola that starts with slope 1 and ends with slope 0: lit skin keeps its hue."""
+    above = np.clip(linear - SHOULDER, 0, WHITE - SHOULDER)
+    return np.where(linear < SHOULDER, linear, SHOULDER + above - above**2 / (2 * (WHITE - SHOULDER)))
+
+
+def before_roll_off(shown: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The linear values that `roll_off` turns into these; `WHITE` for 1 and beyond."""
+    width = WHITE - SHOULDER
+    above = width - np.sqrt(np.maximum(width**2 - 2 * width * (shown - SHOULDER), 0))
+    return np.where(shown < SHOULDER, shown, SHOULDER + above)
 
 
 def to_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -29,4 +38,4 @@ def to_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
-_SRGB = (to_srgb(np.arange(_STEPS) / (_STEPS - 1)) * 255 + 0.5).astype(np.uint8)
+_SRGB = (to_srgb(roll_off(np.linspace(0, WHITE, _STEPS))) * 255 + 0.5).astype(np.uint8)

@@ -15,7 +15,7 @@ _LINES = {
     "torsion": ("torsion", "#2471a3"),
     "kinetic": ("kinetic", "#7f8c8d"),
 }
-_NANOJOULE = 1e-9
+_MICROJOULE = 1e-6
 
 
 def draw_energies(path: Path, diagnostics: Mapping[str, NDArray[np.floating]], fps: float) -> bool:
@@ -28,9 +28,9 @@ def draw_energies(path: Path, diagnostics: Mapping[str, NDArray[np.floating]], f
     figure = Figure(figsize=(8, 4.5), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     for name, (label, colour) in _LINES.items():
-        energy = np.asarray(diagnostics[name]) / _NANOJOULE
+        energy = np.asarray(diagnostics[name]) / _MICROJOULE
         axes.plot(np.arange(len(energy)) / fps, energy, color=colour, label=label, linewidth=1.8)
-    axes.set(xlabel="time [s]", ylabel="energy [nJ]", ylim=(0, None), title="Energy of the guides")
+    axes.set(xlabel="time [s]", ylabel="energy [µJ]", ylim=(0, None), title="Energy of the guides")
     axes.grid(alpha=0.25)
     axes.legend(frameon=False)
     with replacing(path) as temporary:

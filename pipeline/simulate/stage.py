@@ -23,10 +23,11 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
     guides, strand = read_guides(experiment)
     simulation = Simulation(config.simulate, config.seed, guides)
     segments = cache.Segments(experiment.guides, key)
+    kept = experiment.folder / "diverged.h5"
+    kept.unlink(missing_ok=True)
     try:
         _fill(segments, simulation)
     except SimulationDiverged as error:
-        kept = experiment.folder / "diverged.h5"
         _keep(simulation, kept, key)
         detail = f" (strand {strand[error.guide]} of the groom; its state is in {kept})"
         raise SimulationDiverged(error.guide, error.frame, detail) from error

@@ -54,6 +54,10 @@ class Simulation:
     """
 
     def __init__(self, simulate: Simulate, seed: int, guides: Guides) -> None:
+        if simulate.tips and not guides.pins[:, 1].any():
+            raise InputError(
+                "simulate.tips: no strand has a pinned tip to move; set groom.swatch.pin_tips = true"
+            )
         self.simulate = simulate
         self.rest = rest_shape(simulate.hair, guides.points, guides.pins, guides.offset)
         self.field = guides.field

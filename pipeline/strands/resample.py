@@ -1,8 +1,8 @@
 """Strands of any spacing as points at equal spacing along a smooth curve through them.
 
-The curve is the natural cubic spline over chord lengths: twice differentiable, so that it has the curvature that bending
-needs, and exactly straight through two points or a straight strand. Notation: t parameter [m], h its step from point
-to point, M second derivative at the points.
+The curve is the natural cubic spline over chord lengths: twice differentiable, so that it has the curvature that
+bending needs, and exactly straight through two points or a straight strand. Notation: t parameter [m], h its step
+from point to point, M second derivative at the points.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _SMALLEST = 1e-12  # [m] keeps a step that does not exist from being divided by
 
 @dataclass(frozen=True)
 class SmoothCurve:
-    """A curve through the points of each strand: a cubic on each segment, in the distance u from the segment's start."""
+    """A curve through the points of each strand: on each segment a cubic in u, the parameter from its start."""
 
     t: Vectors
     """(S, P) [m]: chord length from the root."""
@@ -59,7 +59,7 @@ def resampled(points: Vectors, count: int) -> Vectors:
 
 
 def _equal_chords(points: Vectors, count: int) -> Vectors:
-    """Chords of equal arcs differ where a strand bends: each round moves the parameters to where they would agree."""
+    """Chords of equal arcs differ where a strand bends: rounds move the parameters to where they agree."""
     curve = SmoothCurve.through(points)
     fraction = np.linspace(0, 1, count)
     t = np.asarray(curve.t[:, -1:] * fraction)
@@ -74,7 +74,10 @@ def _equal_chords(points: Vectors, count: int) -> Vectors:
 
 
 def _second_derivative(slope: Vectors, h: Vectors) -> Vectors:
-    """M (S, P, 3) [1/m], zero at both ends: h_{j-1} M_{j-1} + 2 (h_{j-1} + h_j) M_j + h_j M_{j+1} = 6 (slope_j - slope_{j-1})."""
+    """M (S, P, 3) [1/m], zero at both ends, of a curve with slopes that agree at the points.
+
+    h_{j-1} M_{j-1} + 2 (h_{j-1} + h_j) M_j + h_j M_{j+1} = 6 (slope_j - slope_{j-1})
+    """
     strands, segments, _ = slope.shape
     M = np.zeros((strands, segments + 1, 3))
     ratio = np.zeros((strands, segments, 1))

@@ -16,7 +16,7 @@ def arc_length(points: Points) -> NDArray[np.float64]:
 
 
 def segments_at(lengths: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Which segment (S, Q) of each strand holds the wanted arc lengths (S, Q) [m]; `lengths` is `arc_length(points)`."""
+    """Segment (S, Q) of each strand that holds the wanted arc lengths (S, Q) [m], by `arc_length(points)`."""
     strands, count = lengths.shape
     row = np.arange(strands)[:, None]
     whole = np.maximum(lengths[:, -1:], 1e-300)

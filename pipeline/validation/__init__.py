@@ -1,7 +1,8 @@
 """Strands against what the mechanics of rods says: closed forms and high-accuracy references.
 
 Planar cases hold for every torsion model. Bend-twist and lateral buckling are not here: they need a material
-frame, which the models "rotor" and "frenet" do not have (they turn three-dimensional too early, see docs).
+frame, which the models "rotor" and "frenet" do not have: a curl that hangs from its root turns three-dimensional
+too early with both.
 """
 
 from pipeline.validation import dynamics, friction, statics

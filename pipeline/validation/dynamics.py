@@ -56,7 +56,7 @@ def pendulum(degrees: float, points: int = 16) -> float:
     settings.gravity = (0.0, -GRAVITY, 0.0)
     line = arc * np.array([np.sin(angle), -np.cos(angle), 0])
     rod = Rod(line[None], [HEAD] + [0] * (points - 1), settings, bending=0.0, twisting=0.0)
-    masses = np.full(points, 1e-11)
+    masses = np.full(points, 1e-10)
     masses[-1] = 1e-5
     rod.rest.mass = masses[None]
     return float(4 * first_crossing(rod.trace(80, -1, 0)) * settings.dt / small)

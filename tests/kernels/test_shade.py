@@ -102,7 +102,8 @@ def formula(tangents: _F64, eye: _F64, L: _F64, sigma: float, room: Room) -> _F6
         reflected = sum(along(si[k], so[k], v[p] + v_J) * G[p, 1] for p in range(4))
         c = np.pi / 2 * max(0.2, float(np.dot(room.normal, L)))
         result[k] = np.exp(-n) * direct + (down - np.exp(-n)) * scattered + c * up * reflected
-    return result * np.exp(-room.body)
+    visible: _F64 = result * np.exp(-room.body)
+    return visible
 
 
 def random_tangents(count: int, seed: int) -> _F64:

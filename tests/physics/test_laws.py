@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.validation import Case, CaseResult, all_cases, run_cases, statics
+from pipeline.validation import Case, CaseResult, all_cases, statics
 from pipeline.validation.rod import period
 
 

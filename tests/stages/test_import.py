@@ -129,13 +129,15 @@ def test_every_repair_is_reported_by_strand_index(tmp_path: Path, curl: Points) 
     lines[4][10:14] = lines[4][10]  # repeated
     lines[6][0, 0] = np.inf
     lines[7] = lines[7][:1]  # one point
+    lines[8][12] = 1e30
     write_hair(tmp_path / "groom.hair", ragged(lines))
     strands, report = load(config(tmp_path / "groom.hair"), None)
     assert report["file_strands"] == 9
     assert report["repairs"]["not_finite"] == [2, 6]
     assert report["repairs"]["no_length"] == [3, 7]
+    assert report["repairs"]["too_long"] == [8]
     assert report["repairs"]["merged_points"] == [4]
-    assert len(strands) == 5
+    assert len(strands) == 4
     assert unevenness(strands.points).max() < 1e-4  # float32
 
 
@@ -145,28 +147,26 @@ def test_every_repair_is_reported_by_strand_index(tmp_path: Path, curl: Points) 
         st.tuples(st.integers(0, 3), st.integers(0, 7), st.integers(0, 2)), st.floats(width=32), max_size=6
     )
 )
-def test_hostile_points_give_a_groom_or_a_message(
+def test_hostile_points_harm_no_strand_but_their_own(
     tmp_path: Path, changes: dict[tuple[int, int, int], float]
 ) -> None:
-    """Whatever becomes of the strands that they are in, the others stay as they are."""
-    lines = spikes(4)
+    lines = spikes(5)
     untouched = evenly_spaced(ragged(lines), 32)[0].astype(np.float32)
     for (strand, point, axis), value in changes.items():
         lines[strand][point, axis] = value
     write_hair(tmp_path / "groom.hair", ragged(lines))
-    try:
-        strands, _ = load(config(tmp_path / "groom.hair"), None)
-    except InputError as refused:
-        assert len({strand for strand, _, _ in changes}) == 4 or "finite" in str(refused)
-        return
-    for strand in set(range(4)) - {strand for strand, _, _ in changes}:
+    strands, report = load(config(tmp_path / "groom.hair"), None)
+    dropped = (report["repairs"][name] for name in ("not_finite", "no_length", "too_long"))
+    assert len(strands) == 5 - sum(map(len, dropped))
+    for strand in set(range(5)) - {strand for strand, _, _ in changes}:
         assert np.abs(strands.points - untouched[strand]).max(axis=(1, 2)).min() < 1e-6
 
 
-def test_a_file_without_a_shape_is_refused(tmp_path: Path, curl: Points) -> None:
+@pytest.mark.parametrize("unit_scale", [1e-6, 1e3])
+def test_a_file_without_a_length_of_hair_is_refused(tmp_path: Path, curl: Points, unit_scale: float) -> None:
     write_hair(tmp_path / "groom.hair", ragged([curl, curl + 1]))
-    with pytest.raises(InputError, match=r"none of its 2 strands has a shape; check groom.unit_scale"):
-        load(config(tmp_path / "groom.hair", unit_scale=1e-6), None)
+    with pytest.raises(InputError, match=r"none of its 2 strands has a length .*check groom.unit_scale"):
+        load(config(tmp_path / "groom.hair", unit_scale=unit_scale), None)
 
 
 def test_a_truncated_file_is_refused(tmp_path: Path, curl: Points) -> None:

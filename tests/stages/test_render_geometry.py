@@ -6,10 +6,12 @@ import pytest
 from pipeline.config.schema import Camera, Render
 from pipeline.render.geometry import choose_shape, drawn_width, projected_width, ribbons, smooth, taper
 from pipeline.render.target import BRIGHTEST, DECODED, encode
-from pipeline.render.tone import average, develop, to_srgb
+from pipeline.render.tone import SHOULDER, WHITE, before_roll_off, develop, roll_off, to_srgb
 
 
-@pytest.mark.parametrize(("pixels", "shape"), [(0.2, "lines"), (0.99, "lines"), (1.5, "ribbons"), (3.5, "tubes")])
+@pytest.mark.parametrize(
+    ("pixels", "shape"), [(0.2, "lines"), (0.99, "lines"), (1.5, "ribbons"), (3.5, "tubes")]
+)
 def test_auto_draws_by_projected_width(pixels: float, shape: str) -> None:
     assert choose_shape(Render(), pixels) == shape
     assert choose_shape(Render(geometry="tubes"), pixels) == "tubes"
@@ -75,4 +77,28 @@ def test_samples_are_averaged_in_linear_light() -> None:
     pixels = develop(black_and_white, 2, 1.0)
     assert pixels.shape == (2, 2, 3)
     assert np.abs(pixels.astype(int) - round(255 * float(to_srgb(np.array(0.5))))).max() <= 1
-    assert np.allclose(average(np.ones((6, 6, 3), np.float32), 3), 1)
+
+
+def test_developing_follows_its_formula_in_numpy() -> None:
+    samples = np.random.default_rng(3).integers(0, 256, (12, 18, 3), np.uint8)
+    for per_side in (1, 2, 3):
+        blocks = DECODED[samples].reshape(12 // per_side, per_side, 18 // per_side, per_side, 3)
+        wanted = 255 * to_srgb(roll_off(np.minimum(1.25 * blocks.mean(axis=(1, 3), dtype=np.float64), WHITE)))
+        error = np.abs(develop(samples, per_side, 1.25) - wanted).max()
+        print(f"{per_side} x {per_side} samples: largest error {error:.3f} of a byte")
+        assert error < 0.52
+
+
+def test_highlights_roll_off_smoothly_and_reversibly() -> None:
+    linear = np.linspace(0, 2, 2001)
+    shown = roll_off(linear)
+    slope = np.diff(shown) / np.diff(linear)
+    error = float(np.abs(roll_off(before_roll_off(shown)) - shown).max())
+    print(
+        f"slope {slope.min():.3f} .. {slope.max():.3f}, largest step of it {np.abs(np.diff(slope)).max():.1e}; back {error:.1e}"
+    )
+    assert np.array_equal(shown[linear < SHOULDER], linear[linear < SHOULDER])
+    assert (slope >= -1e-12).all()
+    assert np.abs(np.diff(slope)).max() < 2e-3
+    assert shown[linear >= WHITE] == pytest.approx(1)
+    assert error < 1e-12

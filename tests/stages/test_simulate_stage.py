@@ -11,6 +11,7 @@ import pytest
 from pipeline import cache, kernels
 from pipeline.bench.simulate import bench, round_head
 from pipeline.config.schema import Config, Keyframe, Motion, Simulate
+from pipeline.errors import InputError
 from pipeline.simulate import stage
 from pipeline.simulate.motion import head_motion, place, rotation_matrix
 from pipeline.simulate.rest import rest_shape
@@ -145,6 +146,12 @@ def test_pinned_tips_follow_their_keyframes_relative_to_the_head() -> None:
     error = np.abs(frames[-1].points[:, -2:] - expected).max()
     print(f"driven tips off by {error:.1e} m")
     assert error < 1e-7
+
+
+def test_moving_tips_that_nobody_holds_is_an_error(guides: Guides) -> None:
+    simulate = Simulate(tips=(Keyframe(time=0.0),))
+    with pytest.raises(InputError, match=r"simulate\.tips: no strand has a pinned tip"):
+        Simulation(simulate, 3, guides)
 
 
 def test_divergence_names_guide_and_frame(guides: Guides) -> None:

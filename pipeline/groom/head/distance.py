@@ -3,7 +3,7 @@
 Points are (N, 3) [m], distances (N,) [m], negative inside. Ellipsoid: k0 (k0 - 1) / k1 with k0 = |q/r|,
 k1 = |q/r^2|. Tube: nearest sample of a natural cubic spline, then one Newton step on (c - p) . c' = 0.
 Smooth minimum: min(a, b) - k h^3 / 6 with h = max(k - |a - b|, 0) / k. It makes |d| too small near blends, never
-too large outside; `collision` corrects that for contact.
+too large outside: contact takes its distances from the mesh instead.
 """
 
 from collections.abc import Sequence
@@ -20,13 +20,17 @@ Points = NDArray[np.floating[Any]]
 Distances = NDArray[np.floating[Any]]
 
 FOLD = 2e-3  # [m] half-width over which |x| is rounded off
+_BLOCK = 4096  # points whose parts stay in the processor's cache
 
 
 def distance(p: Points, reach: float = np.inf) -> Distances:
     """Signed distance of points to the head; valid only within `reach` [m] of the surface."""
     p = np.array(p, copy=True)
     p[:, 0] = np.sqrt(p[:, 0] ** 2 + FOLD**2)
-    return fold_parts(p, load_table()["parts"], reach)
+    d = np.empty(len(p), p.dtype)
+    for a in range(0, len(p), _BLOCK):
+        d[a : a + _BLOCK] = fold_parts(p[a : a + _BLOCK], load_table()["parts"], reach)
+    return d
 
 
 def value_and_gradient(p: Points, reach: float = np.inf, eps: float = 3e-4) -> tuple[Distances, Points]:
@@ -62,7 +66,7 @@ def ellipsoid(
     q = (p - np.asarray(center, p.dtype)) @ rotation(turn).astype(p.dtype) / np.asarray(radii, p.dtype)
     k0 = norm(q) + 1e-9
     q /= np.asarray(radii, p.dtype)
-    return k0 * (k0 - 1) / (norm(q) + 1e-9)
+    return np.asarray(k0 * (k0 - 1) / (norm(q) + 1e-9))
 
 
 def tube(p: Points, knots: Sequence[Sequence[float]]) -> Distances:
@@ -76,7 +80,7 @@ def tube(p: Points, knots: Sequence[Sequence[float]]) -> Distances:
     s = -dot(e, v[:, :3]) / np.maximum(vv + dot(e, a[:, :3]), 0.3 * vv)
     s = np.clip(s, -t[i], t[-1] - t[i]).astype(p.dtype)[:, None]
     c = c + s * v + s * s / 2 * a
-    return norm(p - c[:, :3]) - c[:, 3]
+    return np.asarray(norm(p - c[:, :3]) - c[:, 3])
 
 
 def smooth_min(a: Distances, b: Distances, k: float) -> Distances:
@@ -90,7 +94,7 @@ def rotation(turn: Sequence[float]) -> NDArray[np.float64]:
     (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    return about_z @ about_y @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    return np.asarray(about_z @ about_y @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]]))
 
 
 def dot(a: Points, b: Points) -> Distances:

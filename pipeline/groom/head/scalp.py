@@ -26,7 +26,7 @@ def center() -> NDArray[np.float64]:
 def whorl() -> NDArray[np.float64]:
     """Unit vector from the chart's centre to the crown's whorl."""
     w = np.array(load_table()["scalp"]["whorl"], float)
-    return w / np.linalg.norm(w)
+    return np.asarray(w / np.linalg.norm(w))
 
 
 def density(p: Points) -> Points:
@@ -52,7 +52,8 @@ def _margin(p: Points) -> Points:
     line = CubicSpline(np.radians(phi), y, bc_type="clamped")
     x, z = np.abs(p[:, 0]), p[:, 2] - scalp["axis_z"]
     azimuth = np.arctan2(x, z)
-    return (p[:, 1] - line(azimuth)) / np.hypot(1, line(azimuth, 1) / np.maximum(np.hypot(x, z), 0.02))
+    slope = line(azimuth, 1) / np.maximum(np.hypot(x, z), 0.02)
+    return np.asarray((p[:, 1] - line(azimuth)) / np.hypot(1, slope))
 
 
 def rays(uv: Points) -> NDArray[np.float64]:

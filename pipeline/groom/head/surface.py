@@ -1,12 +1,12 @@
-"""The head's skin as triangles, and its distance grid for contact."""
+"""The head's skin as triangles."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, zoom
+from scipy.ndimage import zoom
 
-from pipeline.groom.head.distance import Distances, distance, foot, norm, value_and_gradient
+from pipeline.groom.head.distance import Distances, distance, norm, value_and_gradient
 from pipeline.groom.head.table import load_table
 
 Axes = Sequence[NDArray[np.float64]]
@@ -36,25 +36,6 @@ def contour(scale: float = 1.25) -> tuple[NDArray[np.float32], NDArray[np.int32]
     return p, np.ascontiguousarray(triangles), normals
 
 
-def collision_grid(spacing: float) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """True signed distances [m] on a regular grid, (nx, ny, nz), and the grid's origin [m].
-
-    Nodes near the skin take two Newton steps to their foot; all others take the foot of the nearest of those.
-    """
-    axes = [_regular(spec[0][0], spec[-1][0], spacing) for spec in load_table()["grid"]]
-    d, p = _field(axes).reshape(-1), _lattice(axes)
-    near = np.flatnonzero(np.abs(d) < 2 * spacing)
-    p[near], _ = foot(p[near], reach=REACH)
-    far = np.ones(len(p), bool)
-    far[near] = False
-    shape = [len(a) for a in axes]
-    nearest = distance_transform_edt(far.reshape(shape), return_distances=False, return_indices=True)
-    feet = p[np.ravel_multi_index(tuple(nearest.reshape(3, -1)), shape)]
-    true = np.copysign(norm(_lattice(axes) - feet), d).reshape(shape)
-    origin = np.array([-axes[0][-1], axes[1][0], axes[2][0]])
-    return np.ascontiguousarray(_mirrored(true), np.float32), origin
-
-
 def _pulled(p: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     d, g = value_and_gradient(p, REACH)
     p = p - (d / np.maximum((g * g).sum(1), 0.25))[:, None] * g
@@ -68,10 +49,6 @@ def _axis(spec: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
     index = np.r_[0, np.cumsum(np.diff(fine) / np.interp((fine[1:] + fine[:-1]) / 2, x, h))]
     n = COARSE * int(np.ceil(index[-1] / COARSE))
     return np.interp(np.arange(n + 1), index * n / index[-1], fine)
-
-
-def _regular(start: float, end: float, spacing: float) -> NDArray[np.float64]:
-    return start + spacing * np.arange(COARSE * int((end - start) / spacing / COARSE) + 1)
 
 
 def _field(axes: Axes, reach: float = REACH) -> Distances:

@@ -22,7 +22,9 @@ def read_hair(path: Path) -> Ragged:
     if file.data[:4] != b"HAIR":
         raise file.error('does not begin with "HAIR"; is this a .hair file?')
     names = ("number of strands", "number of points", "flags", "default segments")
-    strands, points, flags, default = (file.number(name, np.uint32, 4 * i + 4) for i, name in enumerate(names))
+    strands, points, flags, default = (
+        file.number(name, np.uint32, 4 * i + 4) for i, name in enumerate(names)
+    )
     if strands == 0:
         raise file.error("number of strands is 0: there is no groom in it")
     if not flags & _POINTS:
@@ -33,7 +35,9 @@ def read_hair(path: Path) -> Ragged:
         offset += 2 * strands
     else:
         if strands * (default + 1) > points:
-            raise file.error(f"default segments are {default}: {strands} strands need more than {points} points")
+            raise file.error(
+                f"default segments are {default}: {strands} strands need more than {points} points"
+            )
         counts = np.full(strands, default + 1, np.int64)
     if int(counts.sum()) != points:
         raise file.error(f"the strands have {int(counts.sum())} points, but the header says {points}")

@@ -49,9 +49,7 @@ def _read_4(file: Bytes) -> Ragged:
     root = np.where(held.all(axis=1), points, (~held).argmax(axis=1))
     tip = np.where(held.all(axis=1), 0, (~held[:, ::-1]).argmax(axis=1))
     pins = np.stack([np.minimum(root, 255), np.minimum(tip, 255)], axis=1).astype(np.uint8)
-    return Ragged(
-        rows[..., :3].reshape(-1, 3).astype(np.float64), np.full(strands, points, np.int64), pins
-    )
+    return Ragged(rows[..., :3].reshape(-1, 3).astype(np.float64), np.full(strands, points, np.int64), pins)
 
 
 def _read_3(file: Bytes) -> Ragged:

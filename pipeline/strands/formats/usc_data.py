@@ -13,7 +13,9 @@ def read_data(path: Path) -> Ragged:
     file = Bytes(path)
     strands = file.number("number of strands", np.int32, 0)
     if strands <= 0 or 4 + 4 * strands > len(file):
-        raise file.error(f"number of strands is {strands}, but the file has {len(file)} bytes; is this a .data file?")
+        raise file.error(
+            f"number of strands is {strands}, but the file has {len(file)} bytes; is this a .data file?"
+        )
     counts = np.empty(strands, np.int64)
     pieces = []
     offset = 4
