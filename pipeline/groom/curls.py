@@ -37,7 +37,7 @@ def curled(
         seed, index, 83
     )
     hand = np.where(uniform(seed, lock, 84) < 0.5, -1.0, 1.0)
-    radius = curl.radius * np.clip(1 + curl.radius_jitter * normal(seed, lock, 85), 0.3, 1.8)
+    radius = curl.radius * np.clip(1 + curl.radius_jitter * normal(seed, lock, 85), 0.5, 1.5)
     radius = radius * (0.85 + 0.3 * uniform(seed, index, 86))
     theta = phase[:, None] + 2 * np.pi * along / pitch[:, None]
     amplitude = radius[:, None] * smoothstep((along - curl.onset) / curl.ramp)

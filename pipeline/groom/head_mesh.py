@@ -1,9 +1,14 @@
 """Load a head mesh: VTK's readers for OBJ, PLY, STL and VTP, meshio for other formats.
 
-Meshes are welded, triangulated and checked; a mesh that is not closed is refused with what is open, because contact
-needs an inside.
+Readers run in a process of their own, with a limit on its memory: damaged files make them crash or ask for more than
+there is, and what they print is for programmers. Meshes are welded, triangulated and checked; one that is not closed
+is refused with what is open, because contact needs an inside.
 """
 
+import resource
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +18,13 @@ from numpy.typing import NDArray
 from pipeline.errors import InputError
 from pipeline.groom.axes import upright
 
-_VTK_FORMATS = {".obj", ".ply", ".stl", ".vtp"}
+Points = NDArray[np.float64]
+Faces = NDArray[np.int64]
+
+_READER_BYTES = 8 << 30  # address space of a reader, more for large files
+_BYTES_A_BYTE = 200  # memory that one byte of a file may ask for
+_SAME = 1e-6  # of the mesh's size: points this near are one
+_FLAT = 1e-9  # of the size cubed: less is no volume
 
 
 def load_mesh(
@@ -26,21 +37,22 @@ def load_mesh(
     """
     if not path.is_file():
         raise InputError(f'{path}: no such mesh; scene.head takes a path, "builtin" or "none"')
-    points, faces = _read(path)
-    if not np.isfinite(points).all():
-        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise InputError(f"{path}: point {bad} is not finite; repair the mesh")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; export the mesh again")
+    points, faces = _read_apart(path)
     if len(faces) == 0:
         raise InputError(f"{path}: no faces; scene.head needs a surface")
     if faces.min() < 0 or faces.max() >= len(points):
-        raise InputError(
-            f"{path}: a face names point {int(faces.max())}, but there are {len(points)} points; export it again"
-        )
-    points, faces = _welded(points.astype(np.float64), faces)
+        raise InputError(f"{path}: a face names a point that is not among the {len(points)}; export it again")
+    if not np.isfinite(points).all():
+        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise InputError(f"{path}: point {bad} is not finite; repair the mesh")
+    points, faces = _welded(points, faces)
     _require_closed(path, faces)
+    faces = _wound_outwards(points, faces)
+    if len(faces) == 0 or _volumes(points, faces).sum() < _FLAT * np.ptp(points, axis=0).max() ** 3:
+        raise InputError(f"{path}: the surface encloses no volume; scene.head needs a solid head")
     points = upright(points * unit_scale, up_axis)
-    if _volume(points, faces) < 0:
-        faces = faces[:, ::-1]
     return points.astype(np.float32), np.ascontiguousarray(faces, np.int32)
 
 
@@ -55,84 +67,133 @@ def point_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> 
     return np.asarray(normals / length, np.float32)
 
 
-def _read(path: Path) -> tuple[NDArray[Any], NDArray[np.int64]]:
-    if path.suffix.lower() in _VTK_FORMATS:
+def _read_apart(path: Path) -> tuple[Points, Faces]:
+    with tempfile.TemporaryDirectory() as folder:
+        found = Path(folder) / "mesh.npz"
+        command = [sys.executable, "-m", "pipeline.groom.head_mesh", str(path.absolute()), str(found)]
+        reader = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, check=False)
+        if reader.returncode != 0 or not found.is_file():
+            raise InputError(
+                f"{path}: not a readable mesh; scene.head takes OBJ, PLY, STL, VTP or what meshio reads"
+            )
+        with np.load(found) as arrays:
+            return arrays["points"].astype(np.float64), arrays["faces"].astype(np.int64)
+
+
+def _read(path: Path) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Points and triangles as the file has them; anything may happen with a damaged one."""
+    if path.suffix.lower() in (".obj", ".ply", ".stl", ".vtp"):
         return _read_vtk(path)
     import meshio
 
-    try:
-        mesh = meshio.read(path)
-    except (meshio.ReadError, SystemExit, ValueError, KeyError, IndexError) as error:
-        raise InputError(f"{path}: meshio cannot read it ({error}); use OBJ, PLY, STL or VTP") from error
+    mesh = meshio.read(path)
     cells = [_fans(block.data) for block in mesh.cells if block.type in ("triangle", "quad", "polygon")]
-    faces = np.concatenate(cells) if cells else np.zeros((0, 3), np.int64)
-    return np.asarray(mesh.points)[:, :3], faces
+    return np.asarray(mesh.points)[:, :3], np.concatenate([np.zeros((0, 3), np.int64), *cells])
 
 
-def _read_vtk(path: Path) -> tuple[NDArray[Any], NDArray[np.int64]]:
-    import pyvista as pv
-    import vtk
+def _read_vtk(path: Path) -> tuple[NDArray[Any], NDArray[Any]]:
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkFiltersCore import vtkTriangleFilter
+    from vtkmodules.vtkIOGeometry import vtkOBJReader, vtkSTLReader
+    from vtkmodules.vtkIOPLY import vtkPLYReader
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty")
-    log = vtk.vtkObject.GetGlobalWarningDisplay()
-    vtk.vtkObject.GlobalWarningDisplayOff()
-    try:
-        mesh = pv.PolyData(str(path)).triangulate()
-    except (OSError, ValueError, RuntimeError) as error:
-        raise InputError(f"{path}: not a readable mesh ({error})") from error
-    finally:
-        vtk.vtkObject.SetGlobalWarningDisplay(log)
-    if mesh.n_points == 0:
-        raise InputError(f"{path}: not a readable mesh, or one without points")
-    faces = np.asarray(mesh.faces, np.int64).reshape(-1, 4)[:, 1:]
-    return np.asarray(mesh.points), faces
+    readers = {".obj": vtkOBJReader, ".ply": vtkPLYReader, ".stl": vtkSTLReader, ".vtp": vtkXMLPolyDataReader}
+    reader, triangles = readers[path.suffix.lower()](), vtkTriangleFilter()
+    reader.SetFileName(str(path))
+    triangles.SetInputConnection(reader.GetOutputPort())
+    triangles.PassLinesOff()
+    triangles.PassVertsOff()
+    triangles.Update()
+    mesh = triangles.GetOutput()
+    points = vtk_to_numpy(mesh.GetPoints().GetData())
+    return points, vtk_to_numpy(mesh.GetPolys().GetConnectivityArray()).reshape(-1, 3)
 
 
-def _fans(polygons: NDArray[Any]) -> NDArray[np.int64]:
+def _fans(polygons: NDArray[Any]) -> Faces:
     """Triangles of convex polygons of one size (N, K)."""
     p = np.asarray(polygons, np.int64)
     return np.concatenate([p[:, [0, k, k + 1]] for k in range(1, p.shape[1] - 1)])
 
 
-def _welded(
-    points: NDArray[np.float64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _welded(points: Points, faces: Faces) -> tuple[Points, Faces]:
     """Merge points that lie within a millionth of the mesh's size; drop triangles that collapse and lone points."""
-    cell = max(float(np.ptp(points[faces.ravel()], axis=0).max()), 1e-30) * 1e-6
-    _, first, merged = np.unique(
-        np.round(points / cell).astype(np.int64), axis=0, return_index=True, return_inverse=True
-    )
-    faces = merged.reshape(-1)[faces]
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
+    low = points[faces.ravel()].min(axis=0)
+    cell = max(float((points[faces.ravel()] - low).max()), 1e-300) * _SAME
     used, faces = np.unique(faces, return_inverse=True)
-    return points[first[used]], faces.reshape(-1, 3).astype(np.int64)
+    points = points[used]
+    cells = np.round((points - low) / cell).astype(np.int64)
+    _, first, merged = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    a, b, c = merged.reshape(-1)[faces.reshape(-1, 3)].T
+    kept = (a != b) & (b != c) & (c != a)
+    return points[first], np.stack([a, b, c], axis=1)[kept].astype(np.int64)
 
 
-def _require_closed(path: Path, faces: NDArray[np.int64]) -> None:
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
+def _require_closed(path: Path, faces: Faces) -> None:
+    unique, count = np.unique(np.sort(_edges(faces), axis=1), axis=0, return_counts=True)
     crowded, open_edges = int((count > 2).sum()), unique[count == 1]
     if crowded:
         raise InputError(f"{path}: {crowded} edges belong to three or more faces; make the surface manifold")
     if len(open_edges):
+        loops = _components(open_edges)[0]
         raise InputError(
-            f"{path}: the surface is open: {len(open_edges)} boundary edges in {_loops(open_edges)} loops; "
+            f"{path}: the surface is open: {len(open_edges)} boundary edges in {loops} loops; "
             "close the holes (neck, eyes, mouth) and export it again"
         )
 
 
-def _loops(edges: NDArray[np.int64]) -> int:
+def _wound_outwards(points: Points, faces: Faces) -> Faces:
+    """Triangles of a closed mesh wound alike, and outwards as a whole; parts that were not alike, each outwards."""
+    directed = _edges(faces)
+    order = np.lexsort(np.sort(directed, axis=1).T)
+    one, other = order.reshape(-1, 2).T  # the two triangles' sides of each edge
+    alike = directed[one, 0] == directed[other, 1]
+    pair = np.stack([one, other], axis=1) % len(faces)
+    if not alike.all():
+        # Each triangle as given (t) and reversed (t + T); what belongs together in space is joined in this graph.
+        T = len(faces)
+        given = np.where(alike[:, None], pair, pair + [0, T])
+        reverse = np.where(alike[:, None], pair + T, pair + [T, 0])
+        side = _components(np.concatenate([given, reverse]))[1]
+        flipped = side[:T] > side[T:]
+        faces = np.where(flipped[:, None], faces[:, ::-1], faces)
+        part = _components(pair)[1]
+        inwards = np.bincount(part, _volumes(points, faces)) < 0
+        return np.where(inwards[part][:, None], faces[:, ::-1], faces)
+    return faces[:, ::-1] if _volumes(points, faces).sum() < 0 else faces
+
+
+def _components(links: NDArray[np.int64]) -> tuple[int, NDArray[np.int32]]:
+    """Number of connected parts of the numbers that links (N, 2) join, and the part of each number, ascending."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    names, index = np.unique(edges, return_inverse=True)
+    names, index = np.unique(links, return_inverse=True)
     a, b = index.reshape(-1, 2).T
     graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(names), len(names)))
-    return int(connected_components(graph, directed=False)[0])
+    count, part = connected_components(graph, directed=False)
+    return int(count), part
 
 
-def _volume(points: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
-    p = points[faces]
-    return float(np.einsum("ij,ij->", p[:, 0], np.cross(p[:, 1], p[:, 2])) / 6)
+def _edges(faces: Faces) -> Faces:
+    """Directed edges (3 T, 2); edge e is of triangle e modulo T."""
+    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _volumes(points: Points, faces: Faces) -> NDArray[np.float64]:
+    """Signed volumes (T,) between each triangle and the middle of the mesh."""
+    a, b, c = (points - points.mean(axis=0))[faces].transpose(1, 0, 2)
+    return np.asarray(np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
+
+
+def _main(path: Path, found: Path) -> None:
+    """Read a mesh, whatever it may be, within bounds of memory."""
+    limit = _READER_BYTES + _BYTES_A_BYTE * path.stat().st_size
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    points, faces = _read(path)
+    np.savez(found, points=points, faces=faces)
+
+
+if __name__ == "__main__":
+    _main(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Config
+from pipeline.errors import InputError
 from pipeline.groom.head import scalp
 from pipeline.groom.head_field import Field
 
@@ -22,6 +23,7 @@ Feet = Callable[[Points], tuple[Points, Points]]
 # The mannequin's skull [m]: what a mesh is fitted to.
 _CROWN, _BREADTH, _OCCIPUT, _TOP = 0.131, 0.158, -0.0876, 0.075
 
+_SMALLEST, _LARGEST = 0.05, 3.0  # [m] from end to end of a mesh; the largest are whole bodies
 _STUBBLE = 0.7  # part of the scalp's colour that roots hide
 
 
@@ -102,6 +104,12 @@ def _from_mesh(config: Config) -> Head:
 
     scene = config.scene
     points, triangles = load_mesh(Path(scene.head), scene.unit_scale, scene.up_axis)
+    largest = float(np.ptp(points, axis=0).max())
+    if not _SMALLEST < largest < _LARGEST:
+        raise InputError(
+            f"{scene.head}: {largest:.3g} m from end to end is not the size of a head; "
+            "scene.unit_scale is metres per unit of the file (0.01 for centimetres)"
+        )
     normals = point_normals(points, triangles)
     tone = srgb_to_linear(np.array(load_table()["skin"][scene.skin]))
     field = distance_grid(points, triangles, config.simulate.contact.spacing)

@@ -19,9 +19,10 @@ from pipeline.groom.heads import Head
 from pipeline.groom.locks import Bundle, Locks
 from pipeline.groom.partings import PartingLine
 from pipeline.groom.paths import STEP, Terrain, cut_lengths, grow, traits
+from pipeline.groom.repairs import pushed_out
 from pipeline.groom.roots import place_roots
 from pipeline.strands.random import hashed, uniform
-from pipeline.strands.spacing import equal_spacing
+from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
 
 Vectors = NDArray[np.float64]
@@ -74,7 +75,7 @@ class Style:
         points = curled(self.groom.curl, self.seed, index, lock, points, along, comb)
         points = frizzed(self.groom.frizz, self.seed, index, own.flyaway, points, along)
         points[:, 0] = roots
-        points = np.asarray(equal_spacing(self._outside(points), self.groom.points), np.float64)
+        points = self._evened(points)
         return Strands(
             points=self.head.to_world(points).astype(np.float32),
             pins=np.tile(np.array([2, 0], np.uint8), (len(index), 1)),
@@ -114,13 +115,22 @@ class Style:
         row = np.arange(len(index))[:, None]
         return Bundle(paths.points[row, i] * (1 - u) + paths.points[row, i + 1] * u, length), paths.comb
 
+    def _evened(self, points: Vectors) -> Vectors:
+        """Points at equal spacing, none of them below the skin; resampling may put some back there, so it repeats."""
+        points = resampled(self._outside(points), self.groom.points)
+        points, _ = pushed_out(points, self.terrain.skin)
+        d = self.terrain.skin.distance(points[:, 1:].reshape(-1, 3)).reshape(len(points), -1)
+        deep = d.min(axis=1) < 0.5 * _CLEARANCE
+        points[deep] = resampled(self._outside(points[deep]), self.groom.points)
+        return points
+
     def _outside(self, points: Vectors) -> Vectors:
         """Points below the skin pushed out of it; roots stay on it."""
-        for _ in range(3):
+        lowest = np.full(points[:, 1:].shape[:2], _CLEARANCE)
+        lowest[:, 0] *= 0.5
+        for _ in range(2):
             p = points[:, 1:].reshape(-1, 3)
             d, n = self.terrain.skin.sample(p)
-            lowest = np.full(points[:, 1:].shape[:2], _CLEARANCE)
-            lowest[:, :2] *= 0.5
             depth = np.maximum(lowest.ravel() - d, 0)
             points[:, 1:] = (p + depth[:, None] * n).reshape(points[:, 1:].shape)
         return points

@@ -5,7 +5,7 @@ import numpy as np
 from pipeline.config.schema import Config
 from pipeline.groom.curls import curled
 from pipeline.strands.random import hashed
-from pipeline.strands.spacing import equal_spacing
+from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
 
 _PLASTIC = 1.32471795724474602596
@@ -28,7 +28,7 @@ def swatch(config: Config) -> Strands:
         reference = np.broadcast_to(across, roots.shape)
         points = curled(groom.curl, config.seed, index, index, points, lengths, reference)
         points[:, 0] = roots
-        points = equal_spacing(points, groom.points)
+        points = resampled(points, groom.points)
     return Strands(
         points=points.astype(np.float32),
         pins=np.tile(np.array([2, 2 if groom.swatch.pin_tips else 0], np.uint8), (len(index), 1)),

@@ -298,7 +298,7 @@ def expand(
 
     """
 
-# --- shading: density grid, sweeps, fibre shading (density, sweep, fibre, shade, surface .hpp) ------
+# --- shading: density grid, sweeps, fibres, skin (density, sweep, sky, fibre, shade, surface .hpp) ---
 #
 # World space [m], float32. Lights are directional; `directions` are unit vectors from the scene to the light.
 
@@ -402,7 +402,7 @@ class Illumination:
     def __init__(
         self, directions: _F32, irradiance: _F32, sky: _F32, depths: tuple[_F32, _F32, _F32], surroundings: _F32
     ) -> None:
-        """Held and not copied.
+        """Lights, and the depths in the memory order that shading reads; the depths are copied, the rest is held.
 
         Args:
             directions: (L, 3) float32 unit vectors towards the lights.

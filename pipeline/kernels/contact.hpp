@@ -128,6 +128,18 @@ template <class Real> struct Contacts {
         return deepest;
     }
 
+    /// Depth of the deepest free point of each lane below its offset.
+    L depth(const Block<Real> &b, const HeadStep<Real> &head, const Vec3<Real> *x) {
+        L deepest = none;
+        for (int i = b.first; head.field && i < b.P; ++i) {
+            L distance;
+            Vec3<Real> normal;
+            if (!near(head, i, x[i], b.offset[i], distance, normal)) continue;
+            deepest = maximum<Real>(deepest, select<Real>(b.free[i] > none, b.offset[i] - distance, none));
+        }
+        return deepest;
+    }
+
     /// Step d2 at point i: takes the sliding back as far as the budget mu (new part of s) goes.
     RINGLET_INLINE void rub(const HeadStep<Real> &head, int i, Vec3<Real> old, Real friction, L depth, Mask<Real> here,
                             Motion<Real> &to) {

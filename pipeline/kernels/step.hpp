@@ -78,13 +78,13 @@ template <class Real> class Stepper {
         const Tally<Real> before = tally;
         M failed = attempt(interval, from, to, wanted);
         const M again = failed & hopeless_; // no use to halve again in this step
-        stand_still(from, to, again, Real(interval.dt));
+        stand_still(interval, from, to, again);
         failed &= ~again;
         if (!any<Real>(failed)) return;
         keep_accepted(before, failed);
         if (depth == kHalvings) {
             hopeless_ |= failed;
-            stand_still(from, to, failed, Real(interval.dt));
+            stand_still(interval, from, to, failed);
             return;
         }
         Motion<Real> &middle = halves_[2 * depth], &end = halves_[2 * depth + 1];
@@ -100,16 +100,18 @@ template <class Real> class Stepper {
 
     /// What no step can take, because contacts leave no room for the strand, keeps its shape and follows its root:
     /// lengths hold, the depth is what it is and `Report::depth` tells it.
-    void stand_still(const Motion<Real> &from, Motion<Real> &to, M lanes, Real dt) {
+    void stand_still(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to, M lanes) {
         if (!any<Real>(lanes)) return;
-        const L per_second = splat(Real(1) / dt);
+        const L per_second = splat(Real(1) / Real(interval.dt));
         for (int i = std::max(block.first, 1); i < block.P; ++i) {
             M moved = lanes & (block.free[i] > 0);
             to.x[i] = select(moved, to.x[i - 1] + (from.x[i] - from.x[i - 1]), to.x[i]);
             to.v[i] = select(moved, per_second * (to.x[i] - from.x[i]), to.v[i]);
         }
         for (int j = 0; j < block.P - 1; ++j) to.T[j] = select<Real>(lanes, from.T[j], to.T[j]);
+        const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
         tally.strain = maximum<Real>(tally.strain, select<Real>(lanes, lengths_.strain(block, to.x), L{}));
+        tally.depth = maximum<Real>(tally.depth, select<Real>(lanes, contacts.depth(block, head, to.x), L{}));
     }
 
     /// A failed attempt is not a step's end: its strain and depth do not count.

@@ -40,6 +40,10 @@ class SmoothCurve:
         cubic = [x[:, :-1], slope - h / 6 * (2 * start + end), start / 2, (end - start) / (6 * h)]
         return cls(t, np.stack(cubic, axis=2))
 
+    def of(self, strands: NDArray[np.int64]) -> "SmoothCurve":
+        """The curves of some of the strands."""
+        return SmoothCurve(self.t[strands], self.cubic[strands])
+
     def at(self, t: Vectors) -> Vectors:
         """Points (S, Q, 3) [m] at parameters (S, Q) [m], ascending along each strand."""
         segment = segments_at(self.t, t)
@@ -63,13 +67,17 @@ def _equal_chords(points: Vectors, count: int) -> Vectors:
     curve = SmoothCurve.through(points)
     fraction = np.linspace(0, 1, count)
     t = np.asarray(curve.t[:, -1:] * fraction)
+    found = curve.at(t)
+    left = np.arange(len(points))
     for _ in range(_ROUNDS):
-        found = curve.at(t)
-        chords = arc_length(found)
+        chords = arc_length(found[left])
         wanted = chords[:, -1:] * fraction
-        if (np.abs(chords - wanted) <= _EQUAL * wanted[:, 1:2]).all():
+        unequal = (np.abs(chords - wanted) > _EQUAL * wanted[:, 1:2]).any(axis=1)
+        left, chords, wanted = left[unequal], chords[unequal], wanted[unequal]
+        if not len(left):
             break
-        t = np.asarray(at_arc_length(t[..., None], chords, wanted)[..., 0], np.float64)
+        t[left] = at_arc_length(t[left, :, None], chords, wanted)[..., 0]
+        found[left] = curve.of(left).at(t[left])
     return found
 
 

@@ -25,7 +25,7 @@ CURLY = Groom(
     strands=800,
     points=64,
     small_clumps=Clump(count=500, strength=0.7),
-    curl=Curl(radius=0.0062, pitch=0.024, flatness=0.9, shared_by="small"),
+    curl=Curl(radius=0.009, pitch=0.034, flatness=0.9, shared_by="small"),
     frizz=Frizz(amplitude=0.0008),
 )
 
@@ -235,11 +235,13 @@ def test_the_stage_writes_the_same_bytes_again(
     assert made[0]["guides/offset"].shape == (60, 32)
 
 
-def test_guides_keep_their_groomed_distance_up_to_the_layer(mannequin: Head, wavy: Strands) -> None:
-    contact = Contact(offset=0.001, layer=0.02)
-    offset = stage.contact_offset(Config(name="o", simulate=Simulate(contact=contact)), mannequin, wavy.points[:300])
-    groomed = mannequin.field.distance(wavy.points[:300].reshape(-1, 3)).reshape(300, -1)
-    above = (offset - np.maximum(groomed, 0.001))[:, 2:]
-    print(f"offsets {1000 * offset.min():.2f} to {1000 * offset.max():.2f} mm, at most {1000 * above.max():.2f} above")
-    assert offset.max() <= 0.02 + 1e-6
-    assert (offset[:, 2:] >= 0.001 - 1e-6).all()
+def test_guides_keep_most_of_their_groomed_distance_up_to_the_layer(mannequin: Head, wavy: Strands) -> None:
+    contact, points = Contact(offset=0.001, layer=0.02), wavy.points[:300]
+    offset = stage.contact_offset(Config(name="o", simulate=Simulate(contact=contact)), mannequin, points)
+    groomed = mannequin.field.distance(points.reshape(-1, 3)).reshape(300, -1)
+    above = (offset - np.maximum(groomed, contact.offset)).max()
+    steps = np.abs(np.diff(offset[:, 1:], axis=1)).max(axis=1) / wavy.spacing[:300]
+    print(f"offsets up to {1000 * offset.max():.2f} mm, {1000 * above:.2f} mm above the groomed; steps {steps.max():.2f}")
+    assert offset.max() <= contact.layer + 1e-6
+    assert above < 1e-6
+    assert steps.max() < 0.51
