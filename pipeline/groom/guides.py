@@ -11,16 +11,20 @@ from scipy.spatial import cKDTree
 _ROOT = 10e-3  # [m] of root distance that count as one
 _SHAPE = 30e-3  # [m] of shape difference that count as one
 _SIDE = 4.0  # what the parting counts
-_PREFIX = 20_000  # strands that are looked at: any prefix is a valid groom
+_PREFIX = 20_000  # strands that are looked at, or more for many guides
 _ROUNDS = 12
+
+
+def looked_at(count: int) -> int:
+    """How many strands `choose_guides` looks at for `count` guides: any prefix is a valid groom."""
+    return max(_PREFIX, 4 * count)
 
 
 def choose_guides(points: NDArray[np.float32], side: NDArray[np.int8], count: int) -> NDArray[np.uint32]:
     """Indices (G,) of the guides among strands (S, P, 3) [m], ascending; all strands when there are few."""
     if count >= len(points):
         return np.arange(len(points), dtype=np.uint32)
-    kept = min(len(points), max(_PREFIX, 4 * count))
-    x = features(points[:kept], side[:kept])
+    x = features(points[: looked_at(count)], side[: looked_at(count)])
     centres = x[:count].copy()
     for _ in range(_ROUNDS):
         _, nearest = cKDTree(centres).query(x)

@@ -1,11 +1,13 @@
 """Signed distance grid of a closed triangle mesh.
 
-Nodes near the surface take the exact distance to the nearest triangle; all others take the foot of the nearest node
-beside the surface. Inside or outside is told by the angle-weighted pseudonormal of the face, edge or point that is
-nearest (Baerentzen and Aanaes, "Signed Distance Computation Using the Angle Weighted Pseudonormal", 2005), and away
-from the surface by the region of nodes that a node belongs to.
+Nodes near the surface take the exact distance to the nearest triangle; all others the nearest foot that sweeps over
+the grid bring them from there (Danielsson, "Euclidean Distance Mapping", 1980). Inside or outside is told by the
+angle-weighted pseudonormal of the face, edge or point that is nearest (Baerentzen and Aanaes, "Signed Distance
+Computation Using the Angle Weighted Pseudonormal", 2005), and away from the surface by the region of nodes that a
+node belongs to.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,11 +19,13 @@ from scipy.spatial import cKDTree
 from pipeline.groom.head_field import Field
 
 Vectors = NDArray[np.float64]
+Singles = NDArray[np.float32]
 
 _MARGIN = 0.03  # [m] of grid around the mesh
-_EXACT = 2.0  # [cells] nodes this close to the surface take their exact foot
-_BESIDE = 0.87  # [cells] and these hand their feet on: half the diagonal of a cell
+_EXACT = 3.0  # [cells] nodes this close to the surface take their exact foot
+_BESIDE = 0.87  # [cells] half the diagonal of a cell: some node is always this close
 _TRIED = 3  # samples of the surface whose triangles are tried for a node
+_SWEEPS = (0, 1, 2, 0, 1, 2)  # axes
 
 
 @dataclass(frozen=True)
@@ -151,32 +155,39 @@ def _filled(
     shape: tuple[int, ...],
 ) -> NDArray[np.float32]:
     """Signed distances (nx, ny, nz) [m] of all nodes from those near the surface."""
-    beside = np.flatnonzero(np.abs(signed) <= _BESIDE * spacing)
-    seed = np.full(shape, -1, np.int32)
-    seed.reshape(-1)[near[beside]] = beside
-    nearest = distance_transform_edt(seed < 0, return_distances=False, return_indices=True)
-    foot_of = seed[tuple(nearest)]
-    axes = np.ogrid[tuple(slice(n) for n in shape)]
-    nodes = [np.asarray(low[k] + spacing * axes[k], np.float32) for k in range(3)]
-    square = _squares(feet, foot_of, nodes)
-    for axis in range(3):  # the foot of a neighbour may be nearer
-        views = [np.moveaxis(x, axis, 0) for x in (foot_of, square, *np.broadcast_arrays(*nodes))]
-        for here, there in ((slice(1, None), slice(-1)), (slice(-1), slice(1, None))):
-            foot, own = views[0], views[1]
-            offered = _squares(feet, foot[there], [x[here] for x in views[2:]])
-            closer = offered < own[here]
-            foot[here][closer] = foot[there][closer]
-            own[here][closer] = offered[closer]
+    beside = np.abs(signed) <= _BESIDE * spacing
+    owner = np.full(shape, -1, np.int32)
+    owner.reshape(-1)[near[beside]] = np.flatnonzero(beside)
+    nearest = distance_transform_edt(owner < 0, return_distances=False, return_indices=True)
+    owner = owner[tuple(nearest)]
+    owner.reshape(-1)[near] = np.arange(len(near))
+    node = [np.asarray(low[k] + spacing * np.arange(shape[k]), np.float32) for k in range(3)]
+    foot = feet.astype(np.float32).T[:, owner]
+    square = _square(np.meshgrid(*node, indexing="ij", sparse=True), foot)
+    for axis in _SWEEPS:
+        _sweep(np.moveaxis(foot, axis + 1, 1), np.moveaxis(square, axis, 0), node, axis)
     values = np.where(_inside(signed, near, shape), -np.sqrt(square), np.sqrt(square))
     values.reshape(-1)[near] = signed
     return values
 
 
-def _squares(
-    feet: Vectors, foot_of: NDArray[np.int32], nodes: list[NDArray[np.float32]]
-) -> NDArray[np.float32]:
-    """Squared distances [m^2] of nodes from the feet they are given."""
-    return np.asarray(sum((x - feet[:, k].astype(np.float32)[foot_of]) ** 2 for k, x in enumerate(nodes)))
+def _sweep(foot: Singles, square: Singles, node: list[Singles], axis: int) -> None:
+    """Each layer of nodes, there and back, takes the feet of the layer before it that are nearer than its own."""
+    count = len(square)
+    for layers in (range(1, count), range(count - 2, -1, -1)):
+        for i in layers:
+            offered = foot[:, i - layers.step]
+            here = [node[k] if k != axis else node[k][i : i + 1] for k in range(3)]
+            away = _square(np.meshgrid(*here, indexing="ij", sparse=True), np.expand_dims(offered, axis + 1))
+            away = away.reshape(square[i].shape)
+            closer = away < square[i]
+            square[i][closer] = away[closer]
+            foot[:, i][:, closer] = offered[:, closer]
+
+
+def _square(node: Sequence[Singles], foot: Singles) -> Singles:
+    """Squared distances [m^2] between nodes, given by their coordinates, and feet (3, ...)."""
+    return np.asarray(sum((x - f) ** 2 for x, f in zip(node, foot, strict=True)), np.float32)
 
 
 def _inside(signed: Vectors, near: NDArray[np.int64], shape: tuple[int, ...]) -> NDArray[np.bool_]:
@@ -194,12 +205,12 @@ def _inside(signed: Vectors, near: NDArray[np.int64], shape: tuple[int, ...]) ->
 
 
 def _lattice(n: int) -> Vectors:
-    """Barycentric weights of the middles of the n^2 small triangles of a triangle, and of its corners."""
+    """Barycentric weights of the middles of the n^2 small triangles of a triangle."""
     i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
     up, down = i + j < n, i + j < n - 1
     u = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3]) / n
     v = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3]) / n
-    return np.concatenate([np.stack([1 - u - v, u, v], axis=1), np.eye(3)])
+    return np.stack([1 - u - v, u, v], axis=1)
 
 
 def _summed(values: Vectors, index: NDArray[np.int64]) -> Vectors:

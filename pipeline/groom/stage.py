@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline import cache
 from pipeline.config import Config, provenance
-from pipeline.groom.guides import choose_guides
+from pipeline.groom.guides import choose_guides, looked_at
 from pipeline.groom.heads import Head, make_head
 from pipeline.groom.procedural import Style
 from pipeline.groom.swatch import swatch
@@ -30,14 +30,14 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
     head = make_head(config)
     chunks, count, report = _source(config, head)
     with cache.create(experiment.groom, "groom", key, provenance(config, "groom")) as writer:
-        points, side = _write_strands(writer, chunks, count)
+        points, side = _write_strands(writer, chunks, count, looked_at(config.groom.guides))
         chosen = choose_guides(points, side, config.groom.guides)
         writer.write("guides/strand", chosen)
         writer.write("guides/offset", contact_offset(config, head, points[chosen]))
         if head is not None:
             _write_head(writer, head)
-        writer.meta["report"] = {"strands": len(points), "guides": len(chosen)} | report
-    say("groom", f"{len(points)} strands, {len(chosen)} guides")
+        writer.meta["report"] = {"strands": count, "guides": len(chosen)} | report
+    say("groom", f"{count} strands, {len(chosen)} guides")
 
 
 def contact_offset(config: Config, head: Head | None, guides: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -77,20 +77,20 @@ def _source(config: Config, head: Head | None) -> tuple[Iterable[Strands], int, 
 
 
 def _write_strands(
-    writer: cache.Writer, chunks: Iterable[Strands], count: int
+    writer: cache.Writer, chunks: Iterable[Strands], count: int, kept: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
-    """Stream the strands to the file; returns what guides are chosen from."""
-    columns = None
+    """Stream the strands to the file; returns points and sides of the first `kept`, to choose guides from."""
+    columns: dict[str, cache.columns.ColumnWriter] = {}
     points: list[NDArray[np.float32]] = []
     sides: list[NDArray[np.int8]] = []
     with track("groom", count, "strand") as bar:
         for strands in chunks:
-            if columns is None:
-                columns = _columns(writer, strands.points.shape[1])
+            columns = columns or _columns(writer, strands.points.shape[1])
             for name, column in columns.items():
                 column.append(getattr(strands, name))
-            points.append(strands.points)
-            sides.append(strands.side)
+            points.append(strands.points[:kept])
+            sides.append(strands.side[:kept])
+            kept -= len(points[-1])
             bar.advance(len(strands))
     return np.concatenate(points), np.concatenate(sides)
 

@@ -9,7 +9,18 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline import cache
-from pipeline.config.schema import Clump, Config, Contact, Curl, Frizz, Groom, Parting, Scene, Simulate, Swatch
+from pipeline.config.schema import (
+    Clump,
+    Config,
+    Contact,
+    Curl,
+    Frizz,
+    Groom,
+    Parting,
+    Scene,
+    Simulate,
+    Swatch,
+)
 from pipeline.groom import stage
 from pipeline.groom.curls import curled
 from pipeline.groom.head.distance import distance
@@ -131,7 +142,9 @@ def test_hair_parts_and_stays_parted(wavy: Strands) -> None:
     left = wavy.side > 0
     top = wavy.points[:, 0, 1] > 0.09
     kept = np.sign(wavy.points[top, -1, 0]) == wavy.side[top]
-    print(f"left {left.mean():.2f}; of {top.sum()} strands from the top {kept.mean():.3f} end on their own side")
+    print(
+        f"left {left.mean():.2f}; of {top.sum()} strands from the top {kept.mean():.3f} end on their own side"
+    )
     assert 0.4 < left.mean() < 0.6
     assert np.array_equal(left, wavy.points[:, 0, 0] > 0)
     assert kept.mean() > 0.9
@@ -149,7 +162,14 @@ def test_a_parting_moves_sideways_and_can_be_switched_off(mannequin: Head) -> No
 
 def test_a_curl_is_a_helix_of_the_wanted_radius_and_pitch() -> None:
     curl = Curl(
-        radius=0.005, radius_jitter=0, pitch=0.02, pitch_jitter=0, flatness=1, onset=0, ramp=1e-6, phase_jitter=0
+        radius=0.005,
+        radius_jitter=0,
+        pitch=0.02,
+        pitch_jitter=0,
+        flatness=1,
+        onset=0,
+        ramp=1e-6,
+        phase_jitter=0,
     )
     along = np.tile(np.linspace(0, 0.2, 400), (20, 1))
     points = np.stack([0 * along, -along, 0 * along], axis=2)
@@ -159,7 +179,9 @@ def test_a_curl_is_a_helix_of_the_wanted_radius_and_pitch() -> None:
     turns = np.unwrap(np.arctan2(found[..., 2], found[..., 0]), axis=1)
     pitch = 2 * np.pi * (along[:, -1] - along[:, 1]) / np.abs(turns[:, -1] - turns[:, 0])
     hands = np.unique(np.sign(turns[:, -1] - turns[:, 0]))
-    print(f"radius {radius.min():.5f} to {radius.max():.5f} m, pitch {pitch.min():.4f} to {pitch.max():.4f} m")
+    print(
+        f"radius {radius.min():.5f} to {radius.max():.5f} m, pitch {pitch.min():.4f} to {pitch.max():.4f} m"
+    )
     assert np.ptp(radius, axis=1).max() < 1e-9
     assert radius.max() < 0.005 * 1.151
     assert radius.min() > 0.005 * 0.849
@@ -174,7 +196,9 @@ def test_random_numbers_are_uniform_and_apart() -> None:
     correlation = [abs(np.corrcoef(u[:-1], w)[0, 1]) for w in (u[1:], v[:-1], uniform(6, index, 1)[:-1])]
     fill = np.bincount((64 * u).astype(int), minlength=64)
     chi2 = float(((fill - fill.mean()) ** 2 / fill.mean()).sum())
-    print(f"chi^2 of 64 bins {chi2:.0f}, correlations {np.max(correlation):.4f}, normal {n.mean():.4f} +- {n.std():.4f}")
+    print(
+        f"chi^2 of 64 bins {chi2:.0f}, correlations {np.max(correlation):.4f}, normal {n.mean():.4f} +- {n.std():.4f}"
+    )
     assert u.min() >= 0
     assert u.max() < 1
     assert 30 < chi2 < 110
@@ -189,7 +213,9 @@ def test_a_swatch_has_the_wanted_length_and_direction(radius: float) -> None:
     groom = Groom(source="swatch", strands=50, swatch=patch, curl=Curl(radius=radius, pitch=0.03))
     strands = swatch(Config(name="s", scene=Scene(head="none"), groom=groom))
     tip = strands.points[:, -1] - strands.points[:, 0]
-    print(f"length {strands.length.min():.4f} to {strands.length.max():.4f} m, unequal {unequal(strands.points):.1e}")
+    print(
+        f"length {strands.length.min():.4f} to {strands.length.max():.4f} m, unequal {unequal(strands.points):.1e}"
+    )
     assert np.abs(strands.points[:, 0]).max() <= 0.01 + 1e-6
     assert np.abs(strands.points[:, 0, 2]).max() < 1e-9
     assert np.abs(tip[:, 2] - 0.1).max() < 0.005
@@ -241,7 +267,9 @@ def test_guides_keep_most_of_their_groomed_distance_up_to_the_layer(mannequin: H
     groomed = mannequin.field.distance(points.reshape(-1, 3)).reshape(300, -1)
     above = (offset - np.maximum(groomed, contact.offset)).max()
     steps = np.abs(np.diff(offset[:, 1:], axis=1)).max(axis=1) / wavy.spacing[:300]
-    print(f"offsets up to {1000 * offset.max():.2f} mm, {1000 * above:.2f} mm above the groomed; steps {steps.max():.2f}")
+    print(
+        f"offsets up to {1000 * offset.max():.2f} mm, {1000 * above:.2f} mm above the groomed; steps {steps.max():.2f}"
+    )
     assert offset.max() <= contact.layer + 1e-6
     assert above < 1e-6
     assert steps.max() < 0.51

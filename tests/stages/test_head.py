@@ -23,7 +23,9 @@ def test_every_edge_joins_two_triangles_of_opposite_direction(mannequin: Head) -
     unique, count = np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)
     used = np.unique(mannequin.skin.triangles)
     euler = len(used) - len(unique) + len(mannequin.skin.triangles)
-    print(f"{len(mannequin.skin.triangles)} triangles, edges with two: {(count == 2).sum()} of {len(unique)}, V-E+F {euler}")
+    print(
+        f"{len(mannequin.skin.triangles)} triangles, edges with two: {(count == 2).sum()} of {len(unique)}, V-E+F {euler}"
+    )
     assert (count == 2).all()
     assert len(np.unique(directed, axis=0)) == len(directed)
     assert euler == 2
@@ -45,7 +47,9 @@ def test_the_head_has_the_size_of_a_head(mannequin: Head) -> None:
     top = mannequin.skin.points[mannequin.skin.points[:, 1] > 0.06]
     breadth, depth = np.ptp(top[:, 0]), np.ptp(top[:, 2])
     litres = 1000 * volume(mannequin.skin)
-    print(f"skull {1000 * breadth:.0f} mm wide, {1000 * depth:.0f} mm deep; {litres:.1f} l with neck and bust")
+    print(
+        f"skull {1000 * breadth:.0f} mm wide, {1000 * depth:.0f} mm deep; {litres:.1f} l with neck and bust"
+    )
     assert 0.138 < breadth < 0.168
     assert 0.17 < depth < 0.22
     assert 4 < litres < 12
@@ -70,11 +74,16 @@ def test_the_grid_tells_the_distance_to_the_skin(mannequin: Head) -> None:
     """At points off the mesh along its normals by known amounts, and everywhere with the right sign."""
     skin = mannequin.skin
     chosen = np.arange(0, len(skin.points), 7)
-    convex = np.abs(distance.distance((skin.points + 0.004 * skin.normals)[chosen].astype(np.float64)) - 0.004) < 1e-4
+    convex = (
+        np.abs(distance.distance((skin.points + 0.004 * skin.normals)[chosen].astype(np.float64)) - 0.004)
+        < 1e-4
+    )
     for away in (-0.001, 0.0, 0.001, 0.004):
         p = (skin.points + away * skin.normals)[chosen][convex].astype(np.float64)
         error = np.abs(mannequin.field.distance(p) - away)
-        print(f"{1000 * away:+.0f} mm: worst {1000 * error.max():.2f} mm, 99 % {1000 * np.quantile(error, 0.99):.2f} mm")
+        print(
+            f"{1000 * away:+.0f} mm: worst {1000 * error.max():.2f} mm, 99 % {1000 * np.quantile(error, 0.99):.2f} mm"
+        )
         assert np.quantile(error, 0.99) < 3e-4
     p = np.random.default_rng(2).uniform([-0.16, -0.27, -0.14], [0.16, 0.14, 0.13], (30_000, 3))
     d = distance.distance(p)
@@ -107,7 +116,9 @@ def test_the_chart_keeps_areas_and_leads_back() -> None:
     eps = 1e-5
     u, v = (scalp.rays(uv + eps * np.eye(2)[k]) - scalp.rays(uv - eps * np.eye(2)[k]) for k in range(2))
     area = np.linalg.norm(np.cross(u, v), axis=1) / (2 * eps) ** 2
-    print(f"there and back {np.abs(back - uv).max():.1e}; area per chart area {area.min():.6f} to {area.max():.6f}")
+    print(
+        f"there and back {np.abs(back - uv).max():.1e}; area per chart area {area.min():.6f} to {area.max():.6f}"
+    )
     assert np.abs(back - uv).max() < 1e-12
     assert np.ptp(area) < 1e-6
 

@@ -231,8 +231,12 @@ def test_the_grid_of_a_fine_ball_is_its_distance(rounds: int, spacing: float) ->
     near = np.abs(true) < spacing
     worst, far = np.abs(d - true)[near].max(), np.abs(d - true).max()
     tilted = np.degrees(np.arccos(np.clip((n * p).sum(1) / np.linalg.norm(p, axis=1), -1, 1)))[near].max()
-    print(f"{len(faces)} triangles, {1000 * spacing:.0f} mm: worst {1000 * worst:.3f} mm near, {1000 * far:.3f} mm far")
-    print(f"normals within {tilted:.2f} degrees; value at the middle {1000 * field.distance(np.zeros((1, 3)))[0]:.1f} mm")
+    print(
+        f"{len(faces)} triangles, {1000 * spacing:.0f} mm: worst {1000 * worst:.3f} mm near, {1000 * far:.3f} mm far"
+    )
+    print(
+        f"normals within {tilted:.2f} degrees; value at the middle {1000 * field.distance(np.zeros((1, 3)))[0]:.1f} mm"
+    )
     assert worst < 3e-4
     assert far < 5e-3
     assert tilted < 3
@@ -253,10 +257,21 @@ def test_the_grid_of_a_coarse_ball_is_that_of_its_triangles(rounds: int) -> None
     inside = (height < 0) & (height > -0.006)
     worst = np.abs(d - height)[inside].max()  # inside a convex body the nearest plane is the nearest face
     wrong = (np.sign(d) != np.sign(height))[np.abs(height) > 1e-3]
-    nodes = np.stack(np.meshgrid(*[o + field.spacing * np.arange(n) for o, n in zip(field.origin, field.values.shape, strict=True)], indexing="ij"), -1)
+    nodes = np.stack(
+        np.meshgrid(
+            *[
+                o + field.spacing * np.arange(n)
+                for o, n in zip(field.origin, field.values.shape, strict=True)
+            ],
+            indexing="ij",
+        ),
+        -1,
+    )
     at_nodes = ((nodes.reshape(-1, 3)[:, None] - corners[:, 0]) * normal).sum(2).max(axis=1)
     signs = np.sign(field.values.ravel()) != np.sign(at_nodes)
-    print(f"{len(faces)} triangles: worst {1000 * worst:.3f} mm inside; wrong signs {wrong.sum()}, of nodes {signs.sum()}")
+    print(
+        f"{len(faces)} triangles: worst {1000 * worst:.3f} mm inside; wrong signs {wrong.sum()}, of nodes {signs.sum()}"
+    )
     assert worst < 1.6e-3 if rounds == 0 else worst < 1e-3  # between nodes an edge is rounded off
     assert not wrong.any()
     assert not signs[np.abs(at_nodes) > 1e-6].any()
@@ -299,7 +314,9 @@ def test_hair_grows_on_real_heads(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", HEADS)
-def test_signs_around_real_heads_agree_with_the_solid_angle(name: str, winding: Callable[..., NDArray[np.float64]]) -> None:
+def test_signs_around_real_heads_agree_with_the_solid_angle(
+    name: str, winding: Callable[..., NDArray[np.float64]]
+) -> None:
     axis, scale = HEADS[name]
     points, triangles = load_mesh(real_head(name), scale, axis)
     field = distance_grid(points, triangles, 0.004)
@@ -308,7 +325,9 @@ def test_signs_around_real_heads_agree_with_the_solid_angle(name: str, winding: 
     d = field.distance(p)
     inside = winding(points[triangles].astype(np.float64), p) > 0.5
     clear = np.abs(d) > 1e-3
-    print(f"{name}: {inside.mean():.2f} inside, wrong signs {((d < 0) != inside)[clear].sum()} of {clear.sum()}")
+    print(
+        f"{name}: {inside.mean():.2f} inside, wrong signs {((d < 0) != inside)[clear].sum()} of {clear.sum()}"
+    )
     assert ((d < 0) == inside)[clear].all()
 
 
