@@ -1,7 +1,6 @@
 """Load a head mesh: VTK's readers for OBJ, PLY, STL and VTP, meshio for other formats.
 
-Readers run in a process of their own, with a limit on its memory: damaged files make them crash or ask for more than
-there is, and what they print is for programmers. Meshes are welded, triangulated and checked; one that is not closed
+Readers run in a process of their own, bounded in memory and time: damaged files make them crash or never end, and what they print is for programmers. Meshes are welded, triangulated and checked; one that is not closed
 is refused with what is open, because contact needs an inside.
 """
 
@@ -21,8 +20,9 @@ from pipeline.groom.axes import upright
 Points = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
-_READER_BYTES = 8 << 30  # address space of a reader, more for large files
-_BYTES_A_BYTE = 200  # memory that one byte of a file may ask for
+# What a reader may take, and more for each byte of the file: damaged files ask for anything, or never end.
+_MEMORY, _MEMORY_A_BYTE = 4 << 30, 200  # [bytes]
+_SECONDS, _SECONDS_A_BYTE = 10, 2e-6  # [s] of processor time
 _SAME = 1e-6  # of the mesh's size: points this near are one
 _FLAT = 1e-9  # of the size cubed: less is no volume
 
@@ -67,6 +67,17 @@ def point_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> 
     return np.asarray(normals / length, np.float32)
 
 
+def zero_surface(values: NDArray[Any]) -> tuple[Points, NDArray[np.int32]]:
+    """Where values (nx, ny, nz), negative inside, are zero: points (V, 3) in nodes, triangles (T, 3) wound outwards."""
+    import pyvista as pv
+
+    grid = pv.ImageData(dimensions=values.shape)
+    grid["values"] = values.ravel(order="F")
+    found = grid.contour([0.0], scalars="values", method="flying_edges", compute_normals=False)
+    # Flying edges winds inwards where the inside is negative.
+    return np.asarray(found.points, float), np.ascontiguousarray(found.regular_faces[:, ::-1], np.int32)
+
+
 def _read_apart(path: Path) -> tuple[Points, Faces]:
     with tempfile.TemporaryDirectory() as folder:
         found = Path(folder) / "mesh.npz"
@@ -98,7 +109,12 @@ def _read_vtk(path: Path) -> tuple[NDArray[Any], NDArray[Any]]:
     from vtkmodules.vtkIOPLY import vtkPLYReader
     from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
-    readers = {".obj": vtkOBJReader, ".ply": vtkPLYReader, ".stl": vtkSTLReader, ".vtp": vtkXMLPolyDataReader}
+    readers: dict[str, Any] = {
+        ".obj": vtkOBJReader,
+        ".ply": vtkPLYReader,
+        ".stl": vtkSTLReader,
+        ".vtp": vtkXMLPolyDataReader,
+    }
     reader, triangles = readers[path.suffix.lower()](), vtkTriangleFilter()
     reader.SetFileName(str(path))
     triangles.SetInputConnection(reader.GetOutputPort())
@@ -152,8 +168,8 @@ def _wound_outwards(points: Points, faces: Faces) -> Faces:
     if not alike.all():
         # Each triangle as given (t) and reversed (t + T); what belongs together in space is joined in this graph.
         T = len(faces)
-        given = np.where(alike[:, None], pair, pair + [0, T])
-        reverse = np.where(alike[:, None], pair + T, pair + [T, 0])
+        given = np.where(alike[:, None], pair, pair + np.array([0, T]))
+        reverse = np.where(alike[:, None], pair + T, pair + np.array([T, 0]))
         side = _components(np.concatenate([given, reverse]))[1]
         flipped = side[:T] > side[T:]
         faces = np.where(flipped[:, None], faces[:, ::-1], faces)
@@ -187,10 +203,11 @@ def _volumes(points: Points, faces: Faces) -> NDArray[np.float64]:
 
 
 def _main(path: Path, found: Path) -> None:
-    """Read a mesh, whatever it may be, within bounds of memory."""
-    limit = _READER_BYTES + _BYTES_A_BYTE * path.stat().st_size
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    """Read a mesh, whatever it may be, within bounds of memory and time."""
+    size = path.stat().st_size
+    memory, seconds = _MEMORY + _MEMORY_A_BYTE * size, int(_SECONDS + _SECONDS_A_BYTE * size)
+    for limit, value in (("AS", memory), ("CPU", seconds), ("CORE", 0)):
+        resource.setrlimit(getattr(resource, f"RLIMIT_{limit}"), (value, value))
     points, faces = _read(path)
     np.savez(found, points=points, faces=faces)
 

@@ -210,15 +210,14 @@ def _lattice(n: int) -> Vectors:
     up, down = i + j < n, i + j < n - 1
     u = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3]) / n
     v = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3]) / n
-    return np.stack([1 - u - v, u, v], axis=1)
+    return np.stack([1 - u - v, u, v], axis=1, dtype=np.float64)
 
 
 def _summed(values: Vectors, index: NDArray[np.int64]) -> Vectors:
     """Sums over equal indices (T, 3) of values (T, 3, 3), at each place of the index."""
     flat = index.ravel()
-    return np.stack([np.bincount(flat, values[..., k].ravel())[flat] for k in range(3)], axis=1).reshape(
-        -1, 3, 3
-    )
+    sums = np.stack([np.bincount(flat, values[..., k].ravel())[flat] for k in range(3)], axis=1)
+    return np.asarray(sums, np.float64).reshape(-1, 3, 3)
 
 
 def _dot(a: Vectors, b: Vectors) -> Vectors:

@@ -116,13 +116,9 @@ class Style:
         return Bundle(paths.points[row, i] * (1 - u) + paths.points[row, i + 1] * u, length), paths.comb
 
     def _evened(self, points: Vectors) -> Vectors:
-        """Points at equal spacing, none of them below the skin; resampling may put some back there, so it repeats."""
+        """Points at equal spacing, none of them below the skin."""
         points = resampled(self._outside(points), self.groom.points)
-        points, _ = pushed_out(points, self.terrain.skin)
-        d = self.terrain.skin.distance(points[:, 1:].reshape(-1, 3)).reshape(len(points), -1)
-        deep = d.min(axis=1) < 0.5 * _CLEARANCE
-        points[deep] = resampled(self._outside(points[deep]), self.groom.points)
-        return points
+        return pushed_out(points, self.terrain.skin)[0]
 
     def _outside(self, points: Vectors) -> Vectors:
         """Points below the skin pushed out of it; roots stay on it."""

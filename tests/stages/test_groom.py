@@ -1,5 +1,6 @@
 """Procedural grooms: a strand is itself in any count and chunk, grows on the skin and stays out of it."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,7 @@ def test_any_chunking_gives_the_same_strands(mannequin: Head) -> None:
     style = Style(Config(name="curly", groom=CURLY), mannequin)
     whole = style.strands(0, 800)
     for edges in ([0, 1, 8, 137, 800], [0, 333, 334, 799, 800]):
-        for first, last in zip(edges[:-1], edges[1:], strict=True):
+        for first, last in pairwise(edges):
             part = style.strands(first, last - first)
             assert_same(part, Strands(**{name: getattr(whole, name)[first:last] for name in COLUMNS}))
 
@@ -245,7 +246,7 @@ def test_without_a_head_the_groom_has_none(tmp_path: Path) -> None:
 def test_the_stage_writes_the_same_bytes_again(
     tmp_path: Path, mannequin: Head, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stage, "make_head", lambda config: mannequin)
+    monkeypatch.setattr(stage, "make_head", lambda _config: mannequin)
     config = Config(name="again", groom=Groom(strands=9000, guides=60))
     made = []
     for name in ("a", "b"):

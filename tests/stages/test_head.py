@@ -1,7 +1,6 @@
 """The mannequin: a closed, mirrored skin of a head's size, and a distance grid that agrees with its formula."""
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Config, Contact, Groom, Scene, Simulate

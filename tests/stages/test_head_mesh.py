@@ -167,7 +167,7 @@ def test_vtk_formats_give_the_same_head(tmp_path: Path, ending: str) -> None:
     assert volume(*found) == pytest.approx(np.linalg.det(points[faces]).sum() / 6, rel=1e-5)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.sampled_from(["obj", "ply", "stl", "vtp", "off"]),
     st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), max_size=6),

@@ -33,7 +33,7 @@ def density(p: Points) -> Points:
     """Relative density of roots on the skin: 0 at the hairline to 1 inside it; none on the ears."""
     q = np.array(p, copy=True)
     q[:, 0] = np.abs(q[:, 0])
-    clear = fold_parts(q, [part("ear")], np.inf)
+    clear = fold_parts(q, [part("ear")], _EAR_CLEARANCE)
     return smoothstep(_margin(p) / load_table()["scalp"]["fade"]) * smoothstep(clear / _EAR_CLEARANCE)
 
 

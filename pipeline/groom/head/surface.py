@@ -20,20 +20,15 @@ def contour(scale: float = 1.25) -> tuple[NDArray[np.float32], NDArray[np.int32]
 
     Contoured on stretched axes (1.5 mm on the face to 6 mm on the bust, times `scale`); 1.25 gives 94,000 triangles.
     """
-    import pyvista as pv
+    from pipeline.groom.head_mesh import zero_surface
 
     x, y, z = [_axis([(at, scale * h) for at, h in spec]) for spec in load_table()["grid"]]
     d = _field((x, y, z), REACH * max(scale, 1))
     d, x = _mirrored(d), np.concatenate([-x[:0:-1], x])
-    grid = pv.ImageData(dimensions=d.shape)
-    grid["d"] = d.ravel(order="F")
-    skin = grid.contour([0.0], scalars="d", method="flying_edges", compute_normals=False)
-    index = np.asarray(skin.points, float).T
-    p = np.stack([np.interp(i, np.arange(len(a)), a) for i, a in zip(index, (x, y, z), strict=True)], -1)
+    index, triangles = zero_surface(d)
+    p = np.stack([np.interp(i, np.arange(len(a)), a) for i, a in zip(index.T, (x, y, z), strict=True)], -1)
     p, normals = _pulled(p.astype(np.float32))
-    # Flying edges winds inwards where the inside is negative.
-    triangles = np.asarray(skin.regular_faces, np.int32)[:, ::-1]
-    return p, np.ascontiguousarray(triangles), normals
+    return p, triangles, normals
 
 
 def _pulled(p: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
