@@ -1,7 +1,8 @@
-"""Load a head mesh: VTK's readers for OBJ, PLY, STL and VTP, meshio for other formats.
+"""What the groom needs VTK for: head meshes, loaded from files or taken from a grid of distances.
 
-Readers run in a process of their own, bounded in memory and time: damaged files make them crash or never end, and what they print is for programmers. Meshes are welded, triangulated and checked; one that is not closed
-is refused with what is open, because contact needs an inside.
+OBJ, PLY, STL and VTP are read by VTK, other formats by meshio; in a process of its own, bounded in memory and time,
+because damaged files make readers crash or never end, and what they print is for programmers. Meshes are welded,
+triangulated and checked; one that is not closed is refused with what is open, because contact needs an inside.
 """
 
 import resource

@@ -400,7 +400,12 @@ class Illumination:
     """Lights and sky, and what of them reaches each voxel."""
 
     def __init__(
-        self, directions: _F32, irradiance: _F32, sky: _F32, depths: tuple[_F32, _F32, _F32], surroundings: _F32
+        self,
+        directions: _F32,
+        irradiance: _F32,
+        sky: _F32,
+        depths: tuple[_F32, _F32, _F32],
+        surroundings: _F32,
     ) -> None:
         """Lights, and the depths in the memory order that shading reads; the depths are copied, the rest is held.
 
@@ -418,7 +423,12 @@ class Illumination:
     glints: bool  # True: sampled visibility per strand and 4 mm instead of its mean
 
 def shade(
-    points: _F32, absorption: _F32, key: NDArray[np.uint32], eye: _F64, light: Illumination, tables: FibreTables
+    points: _F32,
+    absorption: _F32,
+    key: NDArray[np.uint32],
+    eye: _F64,
+    light: Illumination,
+    tables: FibreTables,
 ) -> _F32:
     """Radiance of strands towards the eye.
 
