@@ -86,8 +86,9 @@ class FrameRenderer:
     def frame(self, moment: Moment) -> Pixels:
         """Render a moment: sRGB (H, W, 3) uint8."""
         self.strands.frame(moment.guides, moment.pose)
-        lower = moment.guides.min(axis=(0, 1)).astype(np.float64) - _MARGIN
-        upper = moment.guides.max(axis=(0, 1)).astype(np.float64) + _MARGIN
+        # Whole margins: the grid of shadows stands still while hair moves a little, so that nothing shimmers
+        lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
+        upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
         kept = self._light(moment, lower, upper)
         corners = self._corners(moment, lower, upper)
         self.target.clear(self.camera, *self._depths(corners))

@@ -4,7 +4,6 @@ Colours are linear RGB, kept in 8 bits as their cube root over a range of 0 .. 4
 and highlights do not clip before the samples of a pixel are averaged.
 """
 
-import ctypes.util
 import os
 from typing import Any
 
@@ -35,13 +34,13 @@ class Target:
     """A framebuffer; `clear`, then draw in any number of pieces, then `read`."""
 
     def __init__(self, width: int, height: int, background: tuple[float, float, float]) -> None:
-        """Open an off-screen window of width x height samples. Raises InputError when there is no EGL."""
+        """Open an off-screen window of width x height samples. Raises InputError where EGL has no driver."""
         vtk = _vtk()
         self._vtk = vtk
         self.width, self.height = width, height
         self._renderer = vtk.vtkRenderer()
         self._renderer.SetBackground(*(encode(np.array(background)) / 255.0).tolist())
-        self._window = vtk.vtkRenderWindow()
+        self._window = _open_window(vtk)
         self._window.SetOffScreenRendering(1)
         self._window.SetMultiSamples(0)
         self._window.SetSize(width, height)
@@ -154,11 +153,20 @@ class Target:
         return cells
 
 
-def _vtk() -> Any:
-    if ctypes.util.find_library("EGL") is None:
+def _open_window(vtk: Any) -> Any:
+    log = vtk.vtkLogger
+    shown = log.GetCurrentVerbosityCutoff()
+    log.SetStderrVerbosity(log.VERBOSITY_OFF)  # VTK's own words about what is missing name no remedy
+    window = vtk.vtkRenderWindow()
+    log.SetStderrVerbosity(shown)
+    if window.GetClassName() != "vtkEGLRenderWindow":
         raise InputError(
-            "render: libEGL is missing; install it by: sudo apt-get install -y libegl1 libgl1-mesa-dri"
+            "render: no off-screen OpenGL; install it by: sudo apt-get install -y libegl1 libgl1-mesa-dri"
         )
+    return window
+
+
+def _vtk() -> Any:
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     import vtk
 

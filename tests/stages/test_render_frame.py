@@ -1,5 +1,8 @@
 """Whole frames of a few strands: what hides what, chunks, background, provenance."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -145,3 +148,12 @@ def test_movie_and_contact_sheet_hold_the_frames(tmp_path: Path) -> None:
     else:
         with Image.open(movie) as image:
             assert image.n_frames == 5
+
+
+def test_a_machine_without_opengl_gets_one_clear_message() -> None:
+    program = "from pipeline.render.target import Target; Target(8, 8, (0, 0, 0))"
+    blind = os.environ | {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
+    result = subprocess.run([sys.executable, "-c", program], env=blind, capture_output=True, text=True)
+    assert "InputError: render: no off-screen OpenGL" in result.stderr
+    assert "apt-get install -y libegl1 libgl1-mesa-dri" in result.stderr
+    assert "vtk" not in result.stderr.replace("pipeline", "").lower().split("inputerror")[1]
