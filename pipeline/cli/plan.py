@@ -12,20 +12,24 @@ from pipeline.config import Config
 _GB = 1e9
 _FITTED_THREADS = 2
 _START_S = 0.8  # interpreter, libraries
-_START_GB = 0.20
-_VTK_GB = 0.35
-_DEFLATED = 0.85  # float32 positions after shuffle and deflate
+_START_GB = 0.09
+_VTK_GB = 0.46
+_GROOM_GB = 0.39  # head, and chunks of strands in two threads
+_DEFLATED = 0.93  # float32 positions after shuffle and deflate
 _HEAD_M3 = 0.02  # box around a head that holds its distance grid
 
-_GROOM_S_PER_POINT = 3e-6
-_CONTACT_S_PER_VOXEL = 1e-6
-_STEP_S_PER_POINT = 40e-9
-_BIND_S_PER_STRAND = 10e-6
-_RENDER_S_PER_POINT = 0.25e-6
-_RENDER_S_PER_SAMPLE = 0.06e-6
-_RENDER_B_PER_POINT = 40
+_GROOM_S_PER_POINT = 2.7e-6
+_GROOM_B_PER_STRAND = 100
+_HEAD_S_PER_VOXEL = 4.5e-6
+_STEP_S_PER_POINT = {"float32": 40e-9, "float64": 80e-9}
+_BIND_S_PER_STRAND = 4e-6
+_RENDER_S_PER_POINT = 0.45e-6
+_RENDER_S_PER_SAMPLE = 0.05e-6
+_RENDER_B_PER_POINT = 60  # of the strands in flight
 _RENDER_B_PER_SAMPLE = 60
-_PNG_B_PER_PIXEL = 1.2
+_IN_FLIGHT = 65_536  # strands: the renderer's chunk
+_KEPT_B = 400e6  # points that the renderer keeps between its two passes
+_PNG_B_PER_PIXEL = 0.5
 
 
 @dataclass(frozen=True)
@@ -56,16 +60,17 @@ def estimate(config: Config) -> dict[str, Any]:
 def _groom(config: Config) -> Cost:
     points = config.groom.strands * config.groom.points
     voxels = 0.0 if config.scene.head == "none" else _HEAD_M3 / config.simulate.contact.spacing**3
-    seconds = _START_S + _GROOM_S_PER_POINT * points + _CONTACT_S_PER_VOXEL * voxels
+    seconds = _START_S + (_GROOM_S_PER_POINT * points + _HEAD_S_PER_VOXEL * voxels) * _slower()
     stored = (12 * points + 4 * voxels) * _DEFLATED
-    return Cost(_START_GB + 6 * 12 * points / _GB, stored / _GB, seconds)
+    memory = _START_GB + _GROOM_GB + _GROOM_B_PER_STRAND * config.groom.strands / _GB
+    return Cost(memory, stored / _GB, seconds)
 
 
 def _simulate(config: Config) -> Cost:
     simulate = config.simulate
     points = config.groom.guides * config.groom.points
     steps = (simulate.frames + simulate.settle * simulate.fps) * simulate.substeps
-    seconds = _START_S + _STEP_S_PER_POINT * points * steps * _slower()
+    seconds = _START_S + _STEP_S_PER_POINT[simulate.precision] * points * steps * _slower()
     return Cost(_START_GB + 1000 * points / _GB, simulate.frames * 12 * points * _DEFLATED / _GB, seconds)
 
 
@@ -85,7 +90,11 @@ def _render(config: Config) -> Cost:
     pixels = render.size[0] * render.size[1]
     samples = pixels * render.samples**2
     frame = _RENDER_S_PER_POINT * points * _slower() + _RENDER_S_PER_SAMPLE * samples * _slower()
-    memory = _RENDER_B_PER_POINT * points + _RENDER_B_PER_SAMPLE * samples
+    all_points = 12 * _strands(config) * config.groom.points
+    kept = all_points if all_points <= _KEPT_B else 0
+    in_flight = points * min(1.0, _IN_FLIGHT / _strands(config))
+    shapes = 12 * config.groom.strands * config.groom.points + 60 * _strands(config)
+    memory = kept + shapes + _RENDER_B_PER_POINT * in_flight + _RENDER_B_PER_SAMPLE * samples
     return Cost(
         _START_GB + _VTK_GB + memory / _GB,
         frames * pixels * _PNG_B_PER_PIXEL / _GB,
