@@ -53,12 +53,12 @@ class Style:
 
     def chunks(self) -> Iterator[Strands]:
         """All strands, in order; a few chunks are made at once, and no more are kept."""
-        todo = iter(range(0, len(self.roots), CHUNK))
+        starts = iter(range(0, len(self.roots), CHUNK))
         with ThreadPoolExecutor(_WORKERS) as pool:
-            made = deque(pool.submit(self.strands, i) for i in islice(todo, _WORKERS))
+            made = deque(pool.submit(self.strands, i) for i in islice(starts, _WORKERS))
             while made:
                 strands = made.popleft().result()
-                made.extend(pool.submit(self.strands, i) for i in islice(todo, 1))
+                made.extend(pool.submit(self.strands, i) for i in islice(starts, 1))
                 yield strands
 
     def strands(self, first: int, count: int = CHUNK) -> Strands:
