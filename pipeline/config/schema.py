@@ -231,9 +231,9 @@ class Air(Section):
 
 class Contact(Section):
     offset: Annotated[Length, Field(ge=0)] = 1e-3
-    """Distance that guides keep from the skin."""
+    """Distance from the skin that points groomed below it come out to."""
     layer: Annotated[Length, Field(ge=0)] = 0.02
-    """Guides keep their groomed distance from the skin up to this much: the hair below them holds them up."""
+    """Guides keep most of their groomed distance from the skin, up to this much: the hair below holds them up."""
     spacing: Annotated[Length, Field(gt=0)] = 3e-3
     """Spacing of the head's distance grid."""
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import cache, kernels
+from pipeline import cache
+from pipeline.cache.expansion import distance_field
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.simulate.plots import draw_energies
@@ -52,7 +53,7 @@ def read_guides(experiment: cache.Experiment) -> tuple[Guides, NDArray[np.uint32
             points=groom["strands/points"][strand],
             pins=groom["strands/pins"][strand],
             offset=groom["guides/offset"][:],
-            field=_distance_field(groom),
+            field=distance_field(groom),
         )
     return guides, strand
 
@@ -79,10 +80,3 @@ def _keep(simulation: Simulation, path: Path, key: str) -> None:
     with cache.create(path, kind="state", key=key) as writer:
         for name, array in simulation.save().items():
             writer.write(name, array)
-
-
-def _distance_field(groom: cache.Reader) -> kernels.DistanceField | None:
-    if "head/distance" not in groom:
-        return None
-    values, origin = groom["head/distance"][:], groom["head/origin"][:]
-    return kernels.DistanceField(values, origin, float(groom["head/spacing"][0]))
