@@ -104,7 +104,7 @@ bench: env ## the figures of the README
 	$(RINGLET) bench interpolate
 	$(RINGLET) bench render
 
-schema: env ## configs/schema.json, after a change of pipeline/config/schema.py
+schema: env ## configs/schema.json, after a change of pipeline/config/schema/
 	$(RINGLET) config --schema >configs/schema.json
 
 sanitize: env ## kernels under the address and undefined-behaviour sanitizers

@@ -1,0 +1,67 @@
+"""The config schema: every option with its type, unit, default and a sentence, in one room a stage.
+
+`--help` texts, `configs/schema.json` and the table in the docs are generated from it.
+"""
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from pipeline.config.schema.base import Section
+from pipeline.config.schema.groom import Clump, Curl, Cut, Frizz, Groom, Parting, Path, Swatch
+from pipeline.config.schema.interpolate import Interpolate, Variation
+from pipeline.config.schema.render import Fibre, Render
+from pipeline.config.schema.scene import Camera, Light, Scene
+from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, Simulate
+
+__all__ = [
+    "Air",
+    "Camera",
+    "Clump",
+    "Config",
+    "Contact",
+    "Curl",
+    "Cut",
+    "Fibre",
+    "Frizz",
+    "Groom",
+    "Hair",
+    "Interpolate",
+    "Keyframe",
+    "Keyframes",
+    "Light",
+    "Motion",
+    "Parting",
+    "Path",
+    "Render",
+    "Scene",
+    "Section",
+    "Simulate",
+    "Swatch",
+    "Variation",
+]
+
+
+class Config(Section):
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._@=,+-]{0,99}$")]
+    """Name of the experiment and of its folder in outputs/."""
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
+    """Seed of everything random."""
+    scene: Scene = Scene()
+    """Head, lights and camera."""
+    groom: Groom = Groom()
+    """Stage 1: the strands."""
+    simulate: Simulate = Simulate()
+    """Stage 2: the guides in motion."""
+    interpolate: Interpolate = Interpolate()
+    """Stage 3: which guides move which strand."""
+    render: Render = Render()
+    """Stage 4: the frames."""
+
+    @model_validator(mode="after")
+    def _source_fits_head(self) -> "Config":
+        if self.groom.source == "procedural" and self.scene.head == "none":
+            raise ValueError(
+                'groom.source = "procedural" needs a head; with scene.head = "none" use "swatch" or a groom file'
+            )
+        return self

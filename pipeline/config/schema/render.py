@@ -1,0 +1,48 @@
+"""Options of stage 4: the frames."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.config.schema.base import Fraction, Section
+from pipeline.config.units import Angle, Length
+
+
+class Fibre(Section):
+    melanin: Fraction = 0.6
+    """0 is white, 0.2 blonde, 0.6 brown, 0.95 black."""
+    redness: Fraction = 0.5
+    """Share of pheomelanin: 0 is ashen, 1 is red."""
+    melanin_jitter: Fraction = 0.05
+    """Spread of the melanin from strand to strand."""
+    roughness: Annotated[float, Field(ge=0.1, le=1)] = 0.3
+    """Longitudinal roughness."""
+    azimuthal_roughness: Annotated[float, Field(ge=0.1, le=1)] = 0.3
+    """Roughness around the fibre."""
+    tilt: Angle = 0.03490658503988659
+    """Tilt of the cuticle scales."""
+    glints: bool = True
+    """Sample visibility per strand instead of averaging it: single exposed strands sparkle."""
+
+
+class Render(Section):
+    size: tuple[Annotated[int, Field(ge=16, le=16384)], Annotated[int, Field(ge=16, le=16384)]] = (1280, 720)
+    """Width and height of a frame [px]."""
+    samples: Annotated[int, Field(ge=1, le=8)] = 2
+    """N for N x N supersampling."""
+    geometry: Literal["auto", "tubes", "ribbons", "lines"] = "auto"
+    """How strands are drawn; "auto" decides by projected width and prints its choice."""
+    width: Annotated[Length, Field(gt=0)] | None = None
+    """Drawn width (diameter) of a strand; unset, a fibre's, widened to keep the coverage of 100,000 strands when there are fewer."""
+    taper: Fraction = 0.15
+    """Fraction of a strand's length over which its tip thins out."""
+    subdivide: Annotated[int, Field(ge=1, le=8)] = 1
+    """Drawn segments per segment, along a smooth curve through the points."""
+    tube_sides: Annotated[int, Field(ge=3, le=32)] = 4
+    """Sides of a tube."""
+    grid: Annotated[int, Field(ge=16, le=512)] = 128
+    """Voxels along the longest side of the density grid that gives hair its shadows."""
+    exposure: Annotated[float, Field(gt=0)] = 1.25
+    """Factor on linear colours before the sRGB curve."""
+    hair: Fibre = Fibre()
+    """Colour and gloss of the fibres."""

@@ -1,0 +1,51 @@
+"""Options of the scene: head, lights and camera."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.config.schema.base import Colour, Position, Section, Vector
+from pipeline.config.units import Angle
+
+
+class Light(Section):
+    direction: Vector
+    """From the scene towards the light; normalised on use."""
+    colour: Colour = (1.0, 1.0, 1.0)
+    """Linear RGB."""
+    irradiance: Annotated[float, Field(ge=0)] = 1.0
+    """Irradiance on a surface that faces the light [W/m^2]; multiplies the colour."""
+
+
+class Camera(Section):
+    position: Position = (0.40, 0.02, 0.80)
+    """Where the camera stands [m]."""
+    look_at: Position = (0.0, -0.03, 0.0)
+    """The point in the middle of the picture [m]."""
+    up: Vector = (0.0, 1.0, 0.0)
+    """The direction that is up in the picture."""
+    field_of_view: Annotated[Angle, Field(gt=0, lt=3)] = 0.4886921905584123
+    """Vertical field of view."""
+
+
+class Scene(Section):
+    head: str = "builtin"
+    """"builtin" (the mannequin), "none" (strands alone) or the path of a closed mesh, relative to the config."""
+    unit_scale: Annotated[float, Field(gt=0)] = 1.0
+    """Metres per unit of the head's mesh file (0.01 for centimetres)."""
+    up_axis: Literal["x", "y", "z"] = "y"
+    """Which axis of the head's mesh file points up."""
+    skin: Literal["mannequin", "fair", "tan", "deep"] = "mannequin"
+    """Tone of the skin."""
+    background: Colour = (0.2, 0.2, 0.2)
+    """Linear RGB behind everything."""
+    environment: Colour = (0.16, 0.16, 0.16)
+    """Linear RGB radiance of a constant sky that lights everything."""
+    lights: tuple[Light, ...] = (
+        Light(direction=(0.55, 0.75, 0.80), colour=(1.0, 0.96, 0.9), irradiance=3.2),
+        Light(direction=(-0.90, 0.25, 0.60), colour=(0.85, 0.92, 1.0), irradiance=0.8),
+        Light(direction=(-0.45, 0.55, -0.90), irradiance=2.5),
+    )
+    """Directional lights: key, fill and rim by default."""
+    camera: Camera = Camera()
+    """The camera."""
