@@ -105,19 +105,24 @@ template <class Real> Lanes<Real> add_rotor(const Block<Real> &b, Edges<Real> &e
 }
 
 /// Excess of the lecture's regularised torsion at a point, tau - s tau_r, and its gradient by the four edges d[0..3]
-/// around it, with |c|^2 + (0.3)^2 for |c|^2 and s = |c|^2 / (|c|^2 + (0.3)^2).
+/// around it, with |c|^2 + (0.3)^2 for |c|^2 and s = |c|^2 / (|c|^2 + (0.3)^2). The lecture's general form, for unequal
+/// spacing (see operators.hpp): q = w3 c3 / |e3| - w0 c0 / |e0|, with both weights 1 at equal spacing.
 template <class Real> struct FrenetTorsion {
     using L = Lanes<Real>;
     L excess;
     Vec3<Real> by_d[4];
 
-    RINGLET_INLINE FrenetTorsion(const Vec3<Real> *d, L dl, L tau_r) {
+    RINGLET_INLINE FrenetTorsion(const Block<Real> &b, const Edges<Real> &edges, int i) {
+        const Vec3<Real> *d = edges.d + i - 2;
+        const L dl = b.dl[i], tau_r = b.tau_r[i], before = b.l[i - 1], after = b.l[i];
+        const L w0 = after / before * dl / b.dl[i - 1], w3 = before / after * dl / b.dl[i + 1];
         const L least = splat(Real(1e-2)), zero = splat(Real(0));
         Vec3<Real> c0 = d[1] - d[0], c = d[2] - d[1], c3 = d[3] - d[2];
         Vec3<Real> e0 = d[1] + d[0], e = d[2] + d[1], e3 = d[3] + d[2];
-        // q = c3 / |e3| - c0 / |e0|; |e| counts at least 0.1
+        // |e| counts at least 0.1
         L ee0 = dot(e0, e0), ee3 = dot(e3, e3);
-        L i0 = 1 / square_root<Real>(maximum<Real>(ee0, least)), i3 = 1 / square_root<Real>(maximum<Real>(ee3, least));
+        L j0 = 1 / maximum<Real>(ee0, least), j3 = 1 / maximum<Real>(ee3, least);
+        L i0 = w0 * square_root<Real>(j0), i3 = w3 * square_root<Real>(j3);
         Vec3<Real> q = i3 * c3 - i0 * c0, ec = cross(e, c);
         L inverse_cc = 1 / (dot(c, c) + Real(kFrenetSquare)), s = dot(c, c) * inverse_cc;
         L alpha = inverse_cc / (2 * dl), tau = alpha * dot(ec, q);
@@ -126,8 +131,8 @@ template <class Real> struct FrenetTorsion {
         Vec3<Real> by_e = alpha * cross(c, q);
         Vec3<Real> by_c = alpha * cross(q, e) - (2 * inverse_cc * (tau + tau_r * (1 - s))) * c;
         Vec3<Real> by_c3 = (alpha * i3) * ec, by_c0 = (-alpha * i0) * ec;
-        Vec3<Real> by_e3 = select<Real>(ee3 > least, -alpha * i3 * i3 * i3 * dot(c3, ec), zero) * e3;
-        Vec3<Real> by_e0 = select<Real>(ee0 > least, alpha * i0 * i0 * i0 * dot(c0, ec), zero) * e0;
+        Vec3<Real> by_e3 = select<Real>(ee3 > least, -alpha * i3 * j3 * dot(c3, ec), zero) * e3;
+        Vec3<Real> by_e0 = select<Real>(ee0 > least, alpha * i0 * j0 * dot(c0, ec), zero) * e0;
         by_d[0] = by_e0 - by_c0;
         by_d[1] = by_e0 + by_c0 + by_e - by_c;
         by_d[2] = by_e + by_c + by_e3 - by_c3;
@@ -139,7 +144,7 @@ template <class Real> struct FrenetTorsion {
 template <class Real> Lanes<Real> add_frenet(const Block<Real> &b, Edges<Real> &edges) {
     Lanes<Real> energy{};
     for (int i = 2; i < b.P - 2; ++i) {
-        FrenetTorsion<Real> torsion(edges.d + i - 2, b.dl[i], b.tau_r[i]);
+        FrenetTorsion<Real> torsion(b, edges, i);
         Lanes<Real> moment = b.k_tau * b.dl[i] * torsion.excess;
         energy += Real(0.5) * moment * torsion.excess;
         for (int k = 0; k < 4; ++k) edges.D[i - 2 + k] = edges.D[i - 2 + k] + moment * torsion.by_d[k];

@@ -85,7 +85,7 @@ void add_rotor_stiffness(const Block<Real> &b, const Edges<Real> &edges, Lanes<R
 template <class Real, int Band>
 void add_frenet_stiffness(const Block<Real> &b, const Edges<Real> &edges, Lanes<Real> scale, Banded<Real, Band> &A) {
     for (int i = 2; i < b.P - 2; ++i) {
-        FrenetTorsion<Real> torsion(edges.d + i - 2, b.dl[i], b.tau_r[i]);
+        FrenetTorsion<Real> torsion(b, edges, i);
         Vec3<Real> gradient[5], before{};
         for (int k = 0; k < 4; ++k) {
             Vec3<Real> g = turning(torsion.by_d[k], edges.d[i - 2 + k], edges.il[i - 2 + k]);

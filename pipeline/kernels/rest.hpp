@@ -48,10 +48,12 @@ struct Vec {
 /// kappa = 2 |c| / (dl |e|) of two unit edges.
 inline double bend_curvature(Vec d0, Vec d1, double dl) { return 2 * norm(d1 - d0) / (dl * norm(d1 + d0)); }
 
-/// tau = e.(c x q) / (2 dl |c|^2) of four unit edges; 0 where the strand is straight.
-inline double stencil_torsion(const Vec *d, double dl) {
+/// tau = e.(c x q) / (2 dl |c|^2) of four unit edges of lengths l, the lecture's general form (energy.hpp); 0 where the
+/// strand is straight.
+inline double stencil_torsion(const Vec *d, const double *l) {
+    const double dl = 0.5 * (l[1] + l[2]), dl0 = 0.5 * (l[0] + l[1]), dl3 = 0.5 * (l[2] + l[3]);
     Vec before = d[1] - d[0], c = d[2] - d[1], after = d[3] - d[2];
-    Vec q = (1 / norm(d[3] + d[2])) * after - (1 / norm(d[1] + d[0])) * before;
+    Vec q = (l[1] / l[2] * dl / dl3 / norm(d[3] + d[2])) * after - (l[2] / l[1] * dl / dl0 / norm(d[1] + d[0])) * before;
     double cc = dot(c, c);
     return cc < kNoBend * kNoBend ? 0 : dot(d[2] + d[1], cross(c, q)) / (2 * dl * cc);
 }
@@ -83,7 +85,7 @@ inline void derive_strand(RestShape &rest, int s, double mass_per_length, double
     for (int i = 1; i < P - 1; ++i) {
         double dl = 0.5 * (l[i - 1] + l[i]);
         rest.curvature[size_t(s) * (P - 2) + i - 1] = bend_curvature(d[i - 1], d[i], dl);
-        if (i > 1 && i < P - 2) rest.torsion[size_t(s) * (P - 4) + i - 2] = stencil_torsion(&d[i - 2], dl);
+        if (i > 1 && i < P - 2) rest.torsion[size_t(s) * (P - 4) + i - 2] = stencil_torsion(&d[i - 2], &l[i - 2]);
     }
     for (int j = 1; j < P - 2; ++j) {
         size_t k = size_t(s) * (P - 3) + j - 1;

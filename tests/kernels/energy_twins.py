@@ -52,11 +52,13 @@ def rotor(x: Numbers, rest: kernels.RestShape) -> complex:
 
 
 def frenet(x: Numbers, rest: kernels.RestShape) -> complex:
-    """Sum of k_tau (tau - s tau_r)^2 dl / 2, the lecture's tau of unit edges with |c|^2 + 0.3^2 for |c|^2."""
+    """Sum of k_tau (tau - s tau_r)^2 dl / 2, the lecture's general tau with |c|^2 + 0.3^2 for |c|^2 of unit edges."""
     d, dl, tau_r = unit_edges(x), spacing(rest)[1:-1], rest.torsion[0]
     c, e = d[1:] - d[:-1], d[1:] + d[:-1]
-    u = c / norm(e)[:, None]
-    q, c, e = u[2:] - u[:-2], c[1:-1], e[1:-1]
+    u = c / (norm(e) * spacing(rest))[:, None]
+    before, after = rest.length[0][1:-2, None], rest.length[0][2:-1, None]
+    q = (before / after * u[2:] - after / before * u[:-2]) * dl[:, None]
+    c, e = c[1:-1], e[1:-1]
     square = dot(c, c) + 0.3**2
     tau = dot(e, np.cross(c, q)) / (2 * dl * square)
     return complex((rest.twisting[0] * (tau - dot(c, c) / square * tau_r) ** 2 * dl / 2).sum())

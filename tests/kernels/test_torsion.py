@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from conftest import helix
 from numpy.typing import NDArray
+from strand_scenes import shape
 
 from pipeline import kernels
 
@@ -70,3 +71,14 @@ def test_operators_refuse_short_strands_and_unknown_forms(curl: Points) -> None:
         kernels.torsion(curl[None, :4].copy(), "equal")
     with pytest.raises(ValueError, match="equal"):
         kernels.curvature(curl[None], "simple")  # type: ignore[arg-type]
+
+
+def test_the_energy_rests_at_the_general_curvature_and_torsion_of_uneven_strands() -> None:
+    """What "frenet" keeps are the lecture's operators for unequal spacing, and there it stores no energy to speak of."""
+    angle = np.sort(np.random.default_rng(5).uniform(0, 20, 48))
+    curl = np.stack([RADIUS * np.cos(angle), RADIUS * np.sin(angle), RISE * angle], -1)[None]
+    rest = shape(curl)
+    curvature = np.abs(rest.curvature / kernels.curvature(curl, "general") - 1).max()
+    torsion = np.abs(rest.torsion / kernels.torsion(curl, "general") - 1).max()
+    print(f"uneven helix: rest curvature and torsion against the operators {curvature:.1e}, {torsion:.1e}")
+    assert max(curvature, torsion) <= 1e-9
