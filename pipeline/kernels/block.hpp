@@ -54,16 +54,19 @@ template <class Real> struct Block {
     int P;
     int first = 0;            // points before this one are held in every lane
     bool held_inside = false; // some lane holds a point after that
-    Lanes<Real> k_kappa, k_tau, m0;
+    Lanes<Real> k_kappa, k_tau, m0, per_mass; // per_mass = 1 / m0
     Vec3<Real> *anchor;                 // rest position of a point
     Lanes<Real> *l, *dl;                // length of segment j; mean length of the segments beside point i
+    Lanes<Real> *inverse_l, *inverse_dl;
     Lanes<Real> *mu, *w;                // mass and mobility of a point, see above
     Lanes<Real> *free, *hand, *offset;  // 1 where free; 1 where the hand holds; contact offset
     Lanes<Real> *kappa_r, *tau_r;       // at point i
-    Lanes<Real> *C, *S, *rho, *G;       // "rotor" about segment i
+    Lanes<Real> *C, *S, *G;             // "rotor" about segment i
+    Lanes<Real> *root, *inverse_root;   // its sqrt(rho), 1 / sqrt(rho)
 
     Block(Arena &arena, int points) : P(points), anchor(arena.take<Vec3<Real>>(P)) {
-        for (auto **array : {&l, &dl, &mu, &w, &free, &hand, &offset, &kappa_r, &tau_r, &C, &S, &rho, &G})
+        for (auto **array : {&l, &dl, &inverse_l, &inverse_dl, &mu, &w, &free, &hand, &offset, &kappa_r, &tau_r, &C, &S,
+                             &G, &root, &inverse_root})
             *array = arena.take<Lanes<Real>>(P);
     }
 };
@@ -127,7 +130,7 @@ template <class Real> void derive(Block<Real> &b, const RestShape &rest, const i
     const Lanes<Real> one = splat(Real(1)), none = splat(Real(0));
     Lanes<Real> sum = none;
     for (int i = 0; i < b.P; ++i) sum += b.mu[i];
-    b.m0 = sum / Real(b.P);
+    b.m0 = sum / Real(b.P), b.per_mass = 1 / b.m0;
     bool leading = true;
     b.first = 0, b.held_inside = false;
     for (int i = 0; i < b.P; ++i) {
@@ -141,7 +144,8 @@ template <class Real> void derive(Block<Real> &b, const RestShape &rest, const i
         leading = leading && !any<Real>(b.free[i] > none);
         if (leading) b.first = i + 1;
         else if (any<Real>(b.free[i] < one)) b.held_inside = true;
-        if (i > 0 && i < b.P - 1) b.dl[i] = Real(0.5) * (b.l[i - 1] + b.l[i]);
+        if (i < b.P - 1) b.inverse_l[i] = 1 / b.l[i];
+        if (i > 0 && i < b.P - 1) b.dl[i] = Real(0.5) * (b.l[i - 1] + b.l[i]), b.inverse_dl[i] = 1 / b.dl[i];
     }
 }
 
@@ -155,7 +159,7 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
     gather<Real>(b.offset, rest.offset.data(), P, P, strand);
     gather<Real>(b.kappa_r + 1, rest.curvature.data(), P - 2, P - 2, strand);
     gather<Real>(b.tau_r + 2, rest.torsion.data(), P - 4, P - 4, strand);
-    gather<Real>(b.rho + 1, rest.ratio.data(), P - 3, P - 3, strand);
+    gather<Real>(b.root + 1, rest.ratio.data(), P - 3, P - 3, strand);
     gather<Real>(b.G + 1, rest.weight.data(), P - 3, P - 3, strand);
     gather<Real>(b.C + 1, rest.dihedral.data(), P - 3, P - 3, strand);
     gather<Real>(&b.k_kappa, rest.bending.data(), 1, 1, strand);
@@ -164,6 +168,7 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
         for (int lane = 0; lane < kLanes<Real>; ++lane) {
             Real phi = b.C[i][lane];
             b.C[i][lane] = std::cos(phi), b.S[i][lane] = std::sin(phi);
+            b.root[i][lane] = std::sqrt(b.root[i][lane]), b.inverse_root[i][lane] = 1 / b.root[i][lane];
         }
     derive(b, rest, strand);
 }

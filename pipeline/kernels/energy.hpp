@@ -26,7 +26,7 @@ template <class Real> struct Edges {
     void set(const Vec3<Real> *x, int P) {
         for (int j = 0; j < P - 1; ++j) {
             Vec3<Real> edge = x[j + 1] - x[j];
-            il[j] = 1 / square_root<Real>(dot(edge, edge));
+            il[j] = inverse_root<Real>(dot(edge, edge));
             d[j] = il[j] * edge;
             D[j] = Vec3<Real>{};
         }
@@ -57,50 +57,59 @@ template <class Real> struct Bend {
 
     /// Two guards that keep the gradient exact: |e| counts at least 0.1 (a fold sharper than 168 degrees), and
     /// |c| is rounded by 1e-4 of its rest value, where kappa of curly hair has a cusp.
-    RINGLET_INLINE Bend(Vec3<Real> d0, Vec3<Real> d1, L dl, L kappa_r) : c(d1 - d0), e(d1 + d0) {
-        const L least = splat(Real(1e-2)), zero = splat(Real(0));
-        L ee = dot(e, e), rounding = Real(1e-4) * kappa_r * dl;
+    RINGLET_INLINE Bend(const Block<Real> &b, const Edges<Real> &edges, int i)
+        : c(edges.d[i] - edges.d[i - 1]), e(edges.d[i] + edges.d[i - 1]) {
+        const L least = splat(Real(1e-2)), zero = splat(Real(0)), kappa_r = b.kappa_r[i];
+        L ee = dot(e, e), rounding = Real(1e-4) * kappa_r * b.dl[i];
         L cc = dot(c, c) + rounding * rounding;
-        inverse_ee = 1 / maximum<Real>(ee, least);
-        kappa = 2 / dl * square_root<Real>(cc * inverse_ee);
-        by_c = select<Real>(cc > zero, kappa / cc, zero);
+        inverse_ee = reciprocal<Real>(maximum<Real>(ee, least));
+        // r = |c| / |e|, and its inverse where there is a bend
+        L square = cc * inverse_ee, inverse_r = select<Real>(cc > zero, inverse_root<Real>(square), zero);
+        kappa = 2 * b.inverse_dl[i] * square * inverse_r;
+        by_c = 2 * b.inverse_dl[i] * inverse_ee * inverse_r;
         by_e = select<Real>(ee > least, -kappa * inverse_ee, zero);
-        ratio = select<Real>(kappa_r > zero, kappa_r / kappa, zero);
+        ratio = Real(0.5) * kappa_r * b.dl[i] * inverse_r;
     }
 };
 
-/// Adds the gradient of k_kappa (kappa - kappa_r)^2 dl / 2 over all inner points; returns the energy.
+/// Adds the gradient of k_kappa (kappa - kappa_r)^2 dl / 2 at point i; returns the energy.
+template <class Real>
+RINGLET_INLINE Lanes<Real> add_bend_gradient(const Block<Real> &b, const Bend<Real> &bend, Edges<Real> &edges, int i) {
+    Lanes<Real> stiffness = b.k_kappa * b.dl[i], excess = bend.kappa - b.kappa_r[i];
+    // kappa by_c = 4 / (dl^2 |e|^2) has no cusp; the excess enters as 1 - ratio
+    Lanes<Real> along_c = 4 * b.k_kappa * b.inverse_dl[i] * (1 - bend.ratio) * bend.inverse_ee;
+    Lanes<Real> along_e = stiffness * excess * bend.by_e;
+    edges.D[i - 1] = edges.D[i - 1] - along_c * bend.c + along_e * bend.e;
+    edges.D[i] = edges.D[i] + along_c * bend.c + along_e * bend.e;
+    return Real(0.5) * stiffness * excess * excess;
+}
+
+/// Adds the gradient of bending over all inner points; returns the energy.
 template <class Real> Lanes<Real> add_bending(const Block<Real> &b, Edges<Real> &edges) {
     Lanes<Real> energy{};
-    for (int i = 1; i < b.P - 1; ++i) {
-        Bend<Real> bend(edges.d[i - 1], edges.d[i], b.dl[i], b.kappa_r[i]);
-        Lanes<Real> stiffness = b.k_kappa * b.dl[i], excess = bend.kappa - b.kappa_r[i];
-        energy += Real(0.5) * stiffness * excess * excess;
-        // kappa by_c = 4 / (dl^2 |e|^2) has no cusp; the excess enters as 1 - ratio
-        Lanes<Real> along_c = stiffness * (1 - bend.ratio) * (4 * bend.inverse_ee) / (b.dl[i] * b.dl[i]);
-        Lanes<Real> along_e = stiffness * excess * bend.by_e;
-        edges.D[i - 1] = edges.D[i - 1] - along_c * bend.c + along_e * bend.e;
-        edges.D[i] = edges.D[i] + along_c * bend.c + along_e * bend.e;
-    }
+    for (int i = 1; i < b.P - 1; ++i) energy += add_bend_gradient(b, Bend<Real>(b, edges, i), edges, i);
     return energy;
 }
 
-/// Adds the gradient of "rotor" about segments 1 .. P-3; returns the energy
+/// Adds the gradient of "rotor" about segment i; returns the energy
 ///     G/2 |sqrt(rho) R(phi_r) beta_i - beta_{i+1} / sqrt(rho)|^2,   beta = d x d.
+template <class Real> RINGLET_INLINE Lanes<Real> add_rotor_gradient(const Block<Real> &b, Edges<Real> &edges, int i) {
+    const Vec3<Real> d0 = edges.d[i - 1], d1 = edges.d[i], d2 = edges.d[i + 1];
+    const Lanes<Real> G = b.G[i], C = G * b.C[i], S = G * b.S[i];
+    const Lanes<Real> R = G * b.root[i] * b.root[i], I = G * b.inverse_root[i] * b.inverse_root[i];
+    Lanes<Real> p = dot(d0, d1), q = dot(d1, d2);
+    Vec3<Real> d12 = cross(d1, d2), d01 = cross(d0, d1), d20 = cross(d2, d0);
+    Lanes<Real> u0 = R * p + C * q, u2 = I * q + C * p;
+    edges.D[i - 1] = edges.D[i - 1] - (u0 * d1 - C * d2 + S * d12);
+    edges.D[i] = edges.D[i] - (u0 * d0 + u2 * d2 + S * d20);
+    edges.D[i + 1] = edges.D[i + 1] - (u2 * d1 - C * d0 + S * d01);
+    return Real(0.5) * (R * (1 - p * p) + I * (1 - q * q)) - C * (p * q - dot(d0, d2)) - S * dot(d0, d12);
+}
+
+/// Adds the gradient of "rotor" about segments 1 .. P-3; returns the energy.
 template <class Real> Lanes<Real> add_rotor(const Block<Real> &b, Edges<Real> &edges) {
     Lanes<Real> energy{};
-    for (int i = 1; i < b.P - 2; ++i) {
-        const Vec3<Real> d0 = edges.d[i - 1], d1 = edges.d[i], d2 = edges.d[i + 1];
-        const Lanes<Real> C = b.C[i], S = b.S[i], rho = b.rho[i], G = b.G[i];
-        Lanes<Real> p = dot(d0, d1), q = dot(d1, d2);
-        Vec3<Real> d12 = cross(d1, d2), d01 = cross(d0, d1), d20 = cross(d2, d0);
-        energy += G * (Real(0.5) * (rho * (1 - p * p) + (1 - q * q) / rho) - C * (p * q - dot(d0, d2)) -
-                       S * dot(d0, d12));
-        Lanes<Real> u0 = rho * p + C * q, u2 = q / rho + C * p;
-        edges.D[i - 1] = edges.D[i - 1] - G * (u0 * d1 - C * d2 + S * d12);
-        edges.D[i] = edges.D[i] - G * (u0 * d0 + u2 * d2 + S * d20);
-        edges.D[i + 1] = edges.D[i + 1] - G * (u2 * d1 - C * d0 + S * d01);
-    }
+    for (int i = 1; i < b.P - 2; ++i) energy += add_rotor_gradient(b, edges, i);
     return energy;
 }
 
@@ -115,17 +124,19 @@ template <class Real> struct FrenetTorsion {
     RINGLET_INLINE FrenetTorsion(const Block<Real> &b, const Edges<Real> &edges, int i) {
         const Vec3<Real> *d = edges.d + i - 2;
         const L dl = b.dl[i], tau_r = b.tau_r[i], before = b.l[i - 1], after = b.l[i];
-        const L w0 = after / before * dl / b.dl[i - 1], w3 = before / after * dl / b.dl[i + 1];
+        const L w0 = after * b.inverse_l[i - 1] * dl * b.inverse_dl[i - 1];
+        const L w3 = before * b.inverse_l[i] * dl * b.inverse_dl[i + 1];
         const L least = splat(Real(1e-2)), zero = splat(Real(0));
         Vec3<Real> c0 = d[1] - d[0], c = d[2] - d[1], c3 = d[3] - d[2];
         Vec3<Real> e0 = d[1] + d[0], e = d[2] + d[1], e3 = d[3] + d[2];
         // |e| counts at least 0.1
         L ee0 = dot(e0, e0), ee3 = dot(e3, e3);
-        L j0 = 1 / maximum<Real>(ee0, least), j3 = 1 / maximum<Real>(ee3, least);
-        L i0 = w0 * square_root<Real>(j0), i3 = w3 * square_root<Real>(j3);
+        L i0 = inverse_root<Real>(maximum<Real>(ee0, least)), i3 = inverse_root<Real>(maximum<Real>(ee3, least));
+        L j0 = i0 * i0, j3 = i3 * i3;
+        i0 *= w0, i3 *= w3;
         Vec3<Real> q = i3 * c3 - i0 * c0, ec = cross(e, c);
-        L inverse_cc = 1 / (dot(c, c) + Real(kFrenetSquare)), s = dot(c, c) * inverse_cc;
-        L alpha = inverse_cc / (2 * dl), tau = alpha * dot(ec, q);
+        L inverse_cc = reciprocal<Real>(dot(c, c) + Real(kFrenetSquare)), s = dot(c, c) * inverse_cc;
+        L alpha = Real(0.5) * inverse_cc * b.inverse_dl[i], tau = alpha * dot(ec, q);
         excess = tau - s * tau_r;
         // the chain rule, by c and e of the three points
         Vec3<Real> by_e = alpha * cross(c, q);
@@ -140,18 +151,21 @@ template <class Real> struct FrenetTorsion {
     }
 };
 
-/// Adds the gradient of k_tau (tau - s tau_r)^2 dl / 2 at points 2 .. P-3; returns the energy.
-template <class Real> Lanes<Real> add_frenet(const Block<Real> &b, Edges<Real> &edges) {
-    Lanes<Real> energy{};
-    for (int i = 2; i < b.P - 2; ++i) {
-        FrenetTorsion<Real> torsion(b, edges, i);
-        Lanes<Real> moment = b.k_tau * b.dl[i] * torsion.excess;
-        energy += Real(0.5) * moment * torsion.excess;
-        for (int k = 0; k < 4; ++k) edges.D[i - 2 + k] = edges.D[i - 2 + k] + moment * torsion.by_d[k];
-    }
-    return energy;
+/// Adds the gradient of k_tau (tau - s tau_r)^2 dl / 2 at point i; returns the energy.
+template <class Real>
+RINGLET_INLINE Lanes<Real> add_frenet_gradient(const Block<Real> &b, const FrenetTorsion<Real> &torsion,
+                                               Edges<Real> &edges, int i) {
+    Lanes<Real> moment = b.k_tau * b.dl[i] * torsion.excess;
+    for (int k = 0; k < 4; ++k) edges.D[i - 2 + k] = edges.D[i - 2 + k] + moment * torsion.by_d[k];
+    return Real(0.5) * moment * torsion.excess;
 }
 
+/// Adds the gradient of "frenet" at points 2 .. P-3; returns the energy.
+template <class Real> Lanes<Real> add_frenet(const Block<Real> &b, Edges<Real> &edges) {
+    Lanes<Real> energy{};
+    for (int i = 2; i < b.P - 2; ++i) energy += add_frenet_gradient(b, FrenetTorsion<Real>(b, edges, i), edges, i);
+    return energy;
+}
 
 template <class Real> Lanes<Real> add_torsion(Torsion torsion, const Block<Real> &b, Edges<Real> &edges) {
     if (torsion == Torsion::rotor) return add_rotor(b, edges);

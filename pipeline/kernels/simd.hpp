@@ -7,6 +7,9 @@
 
 #include <cmath>
 #include <cstdint>
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
 
 namespace ringlet {
 
@@ -34,6 +37,38 @@ template <class Real> RINGLET_INLINE Lanes<Real> square_root(Lanes<Real> a) {
     Lanes<Real> r;
     for (int i = 0; i < kLanes<Real>; ++i) r[i] = std::sqrt(a[i]);
     return r;
+}
+
+/// 1 / a of a finite a that is not 0, to the last bit or two. Its 14-bit estimate costs a tenth of a division.
+template <class Real> RINGLET_INLINE Lanes<Real> reciprocal(Lanes<Real> a) {
+#ifdef __AVX512F__
+    Lanes<Real> y;
+    if constexpr (sizeof(Real) == 4) {
+        y = Lanes<Real>(_mm512_maskz_rcp14_ps(0xffff, __m512(a)));
+    } else {
+        y = Lanes<Real>(_mm512_maskz_rcp14_pd(0xff, __m512d(a)));
+        y += y * (1 - a * y);
+    }
+    return y + y * (1 - a * y);
+#else
+    return 1 / a;
+#endif
+}
+
+/// 1 / sqrt(a) of a finite a > 0, to the last bit or two.
+template <class Real> RINGLET_INLINE Lanes<Real> inverse_root(Lanes<Real> a) {
+#ifdef __AVX512F__
+    Lanes<Real> y;
+    if constexpr (sizeof(Real) == 4) {
+        y = Lanes<Real>(_mm512_maskz_rsqrt14_ps(0xffff, __m512(a)));
+    } else {
+        y = Lanes<Real>(_mm512_maskz_rsqrt14_pd(0xff, __m512d(a)));
+        y += (Real(0.5) * y) * (1 - (a * y) * y);
+    }
+    return y + (Real(0.5) * y) * (1 - (a * y) * y);
+#else
+    return 1 / square_root<Real>(a);
+#endif
 }
 
 template <class Real> RINGLET_INLINE Lanes<Real> select(Mask<Real> mask, Lanes<Real> yes, Lanes<Real> no) {

@@ -36,15 +36,15 @@ template <class Real> class Stepper {
 
     Stepper(Arena &arena, int P, const StepSettings &settings, const DistanceField *field)
         : block(arena, P), now(arena, P), contacts(arena, P), settings_(settings), field_(field), next_(arena, P),
-          edges_(arena, P), lengths_(arena, P), narrow_(arena, P), wide_(arena, wide(settings) ? P : 0),
+          edges_(arena, P), lengths_(arena, P), solvers_(arena, P, settings.torsion),
           f_(arena.take<Vec3<Real>>(P)), u_(arena.take<Vec3<Real>>(P)), star_(arena.take<Vec3<Real>>(P)) {
         for (int depth = 0; depth < 2 * kHalvings; ++depth) halves_.emplace_back(arena, P);
     }
 
     /// Bytes that a Stepper takes from its arena.
     static size_t bytes(int P) {
-        constexpr size_t bands = 12 + 15 + 2, motions = 2 + 2 * kHalvings, points = 64;
-        return sizeof(L) * (bands * 3 * (P + 16) + (8 * motions + points) * P + 4096);
+        constexpr size_t pivots = 3 * 15, motions = 2 + 2 * kHalvings, points = 80;
+        return sizeof(L) * ((pivots + 8 * motions + points) * P + 4096);
     }
 
     void step(const Interval<Real> &interval, M wanted) {
@@ -60,16 +60,13 @@ template <class Real> class Stepper {
     }
 
   private:
-    static bool wide(const StepSettings &settings) { return settings.torsion == Torsion::frenet; }
-
     const StepSettings &settings_;
     const DistanceField *field_;
     Motion<Real> next_;
     std::vector<Motion<Real>> halves_;
     Edges<Real> edges_;
     Lengths<Real> lengths_;
-    Banded<Real, 12> narrow_;
-    Banded<Real, 15> wide_;
+    Solvers<Real> solvers_;
     Vec3<Real> *f_, *u_, *star_; // forces, velocities of travel, points before the rounds
     M hopeless_{};               // lanes that failed in the shortest step too: not halved again in this one
 
@@ -127,7 +124,6 @@ template <class Real> class Stepper {
         const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
         move_held(interval, from, to);
         edges_.set(from.x, block.P);
-        internal_forces(block, settings_, from.T, edges_, f_);
         contacts.find_rows(block, head, from, dt);
         if (settings_.is_explicit) explicit_velocities(interval, from, to);
         else implicit_velocities(interval, from, to);
@@ -158,16 +154,17 @@ template <class Real> class Stepper {
         const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, f_};
         for (int again = 0;; ++again) {
             ++tally.solves;
-            if (wide(settings_)) solve_velocities(equation, wide_, u_, to.T);
-            else solve_velocities(equation, narrow_, u_, to.T);
-            if (!contacts.any_row) return;
-            if (!contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) return;
+            solvers_.solve(equation, again > 0, u_);
+            if (!contacts.any_row) break;
+            if (!contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) break;
         }
+        predict_tensions(equation, u_, to.T);
     }
 
     /// Symplectic Euler: no matrix, no tension, no rows; lengths and contacts are left to the rounds.
     void explicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
         const L dt = splat(Real(interval.dt));
+        internal_forces(block, settings_, from.T, edges_, f_);
         for (int i = block.first; i < block.P; ++i) {
             Drag<Real> drag(block, from, i, settings_, interval.wind);
             Vec3<Real> v = from.v[i];
@@ -210,7 +207,7 @@ template <class Real> class Stepper {
         const L per_theta = splat(1 / theta()), per_move = splat(1 / (dt * theta()));
         if (!settings_.is_explicit)
             for (int j = 0; j < block.P - 1; ++j)
-                to.T[j] -= block.m0 * lengths_.lambda[j] / (dt * dt * theta() * block.l[j]);
+                to.T[j] -= block.m0 * lengths_.lambda[j] * block.inverse_l[j] / (dt * dt * theta());
         for (int i = 0; i < block.P; ++i) {
             if (i < block.first) {
                 to.v[i] = u_[i];
