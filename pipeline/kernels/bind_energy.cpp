@@ -2,11 +2,14 @@
 #include "bindings.hpp"
 
 #include "energy.hpp"
+#include "twist.hpp"
 #include "operators.hpp"
 
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 
+#include <optional>
 #include <string>
 #include <tuple>
 
@@ -64,6 +67,87 @@ static std::tuple<Doubles, Doubles> energy_and_force(Energy energy, const Points
     return {values, forces};
 }
 
+using Vectors = Array<const double, -1, -1, 3>;
+using Twist = std::optional<Array<const double, -1, -1>>;
+
+static void check_directors(const Points &points, const Vectors &directors) {
+    require(points.shape(1) >= 3, "points: expected at least 3 points a strand");
+    require(directors.shape(0) == points.shape(0) && directors.shape(1) + 1 == points.shape(1),
+            "directors: expected (S, P-1, 3) for the points");
+}
+
+/// Directors without twist.
+static Doubles untwisted(const Points &points) {
+    const int S = int(points.shape(0)), P = int(points.shape(1));
+    require(P >= 2, "points: expected at least 2 points a strand");
+    auto directors = new_array<double>({size_t(S), size_t(P) - 1, 3});
+    Arena arena(sizeof(Lanes<double>) * 16 * (P + 8));
+    Edges<double> edges(arena, P);
+    auto *x = arena.take<Vec3<double>>(P), *m = arena.take<Vec3<double>>(P);
+    for (int k = 0; k < block_count<double>(S); ++k) {
+        const BlockIndex<double> index(k, S);
+        gather(x, points.data(), P, index.strand);
+        edges.set(x, P);
+        untwisted_directors(edges, P, m);
+        scatter(m, directors.data(), P - 1, index);
+    }
+    return directors;
+}
+
+/// Integrated strains (k1, k2, twist) of every joint.
+static Doubles strains(const Points &points, const Vectors &directors) {
+    check_directors(points, directors);
+    const int S = int(points.shape(0)), P = int(points.shape(1));
+    auto values = new_array<double>({size_t(S), size_t(P) - 2, 3});
+    Arena arena(sizeof(Lanes<double>) * 20 * (P + 8));
+    Edges<double> edges(arena, P);
+    auto *x = arena.take<Vec3<double>>(P), *m = arena.take<Vec3<double>>(P), *strain = arena.take<Vec3<double>>(P);
+    for (int k = 0; k < block_count<double>(S); ++k) {
+        const BlockIndex<double> index(k, S);
+        gather(x, points.data(), P, index.strand);
+        gather(m, directors.data(), P - 1, index.strand);
+        edges.set(x, P);
+        for (int i = 1; i < P - 1; ++i) {
+            const Joint<double> q(edges.d[i - 1], edges.d[i], m[i - 1], m[i], Lanes<double>{});
+            strain[i] = {q.k1, q.k2, q.twist};
+        }
+        scatter(strain + 1, values.data(), P - 2, index);
+    }
+    return values;
+}
+
+/// Energy of "kirchhoff", its force on the points and its gradient by the turns of the directors.
+static std::tuple<Doubles, Doubles, Doubles> rod_energy(const Points &points, const Vectors &directors,
+                                                        const RestShape &rest, const Twist &twist) {
+    check_fits(points, rest);
+    check_directors(points, directors);
+    const size_t S = points.shape(0), P = points.shape(1);
+    require(!twist || (twist->shape(0) == S && twist->shape(1) + 2 == P), "twist: expected (S, P-2)");
+    auto values = new_array<double>({S}), forces = new_array<double>({S, P, 3}), turning = new_array<double>({S, P - 1});
+    Arena arena(sizeof(Lanes<double>) * 96 * (P + 8));
+    Block<double> block(arena, rest.P);
+    Motion<double> at(arena, rest.P);
+    Edges<double> edges(arena, rest.P);
+    Rod<double> rod(arena, rest.P);
+    auto *f = arena.take<Vec3<double>>(P);
+    for (int k = 0; k < block_count<double>(rest.S); ++k) {
+        const BlockIndex<double> index(k, rest.S);
+        read(block, rest, index);
+        gather(at.x, points.data(), rest.P, index.strand);
+        gather(at.m, directors.data(), rest.P - 1, index.strand);
+        if (twist) gather<double>(at.twist + 1, twist->data(), rest.P - 2, rest.P - 2, index.strand);
+        edges.set(at.x, rest.P);
+        for (size_t i = 0; i < P; ++i) f[i] = Vec3<double>{};
+        add_rod(block, at.m, at.twist, edges, rod);
+        add_edge_forces(edges, rest.P, f);
+        const Lanes<double> energy = rod.bending + rod.twisting;
+        scatter(&energy, values.data(), 1, index);
+        scatter(f, forces.data(), rest.P, index);
+        scatter(rod.by_theta, turning.data(), rest.P - 1, index);
+    }
+    return {values, forces, turning};
+}
+
 static void check_rest(const RestShape &rest) {
     auto finite = [](const std::vector<double> &values) {
         return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
@@ -75,6 +159,7 @@ static void check_rest(const RestShape &rest) {
     require(std::all_of(rest.mass.begin(), rest.mass.end(), [](double m) { return m > 0 && std::isfinite(m); }),
             "rest_shape: mass_per_length must be positive and finite");
     require(finite(rest.curvature) && finite(rest.torsion), "rest_shape: a strand folds back on itself");
+    require(finite(rest.directors) && finite(rest.strain), "rest_shape: directors must be finite");
 }
 
 template <class T, class Source> static std::vector<T> copied(const Source &array) {
@@ -99,8 +184,16 @@ static RestShape rest_shape(Points points, Array<const double, -1> mass_per_leng
     rest.curvature.resize(S * (P - 2)), rest.torsion.resize(S * (P - 4));
     rest.dihedral.resize(S * (P - 3)), rest.ratio.resize(S * (P - 3)), rest.weight.resize(S * (P - 3));
     for (int s = 0; s < rest.S; ++s) derive_strand(rest, s, mass_per_length.data()[s], kappa_0);
+    const Doubles directors = untwisted(points);
+    rest.bending_2 = rest.bending, rest.load.resize(S * P * 3);
+    rest.directors = copied<double>(directors), rest.strain = copied<double>(strains(points, Vectors(directors)));
     check_rest(rest);
     return rest;
+}
+
+/// A view of one array of vectors of the rest shape, `lost` fewer than P a strand.
+template <auto Member, int lost> static Doubles vectors(RestShape &rest) {
+    return Doubles((rest.*Member).data(), {size_t(rest.S), size_t(rest.P - lost), 3}, nb::find(rest));
 }
 
 /// A view of one array of the rest shape, `lost` fewer than P wide (lost < 0: one value a strand).
@@ -123,9 +216,11 @@ template <auto Member, int lost> static void property(nb::class_<RestShape> &cls
 
 static void bind_rest(nb::module_ &m) {
     nb::class_<RestShape> cls(m, "RestShape");
-    cls.def_prop_ro("points", [](RestShape &rest) {
-        return Doubles(rest.points.data(), {size_t(rest.S), size_t(rest.P), 3}, nb::find(rest));
-    });
+    cls.def_prop_ro("points", &vectors<&RestShape::points, 0>);
+    cls.def_prop_rw("directors", &vectors<&RestShape::directors, 1>, &assign<&RestShape::directors, 1>);
+    cls.def_prop_rw("strain", &vectors<&RestShape::strain, 2>, &assign<&RestShape::strain, 2>);
+    cls.def_prop_rw("load", &vectors<&RestShape::load, 0>, &assign<&RestShape::load, 0>);
+    property<&RestShape::bending_2, -1>(cls, "bending_2");
     property<&RestShape::length, 1>(cls, "length");
     property<&RestShape::mass, 0>(cls, "mass");
     property<&RestShape::bending, -1>(cls, "bending");
@@ -158,6 +253,10 @@ void bind_energy(nb::module_ &m) {
     m.def("torsion_rotor", [](Points points, const RestShape &rest) {
         return energy_and_force(&add_rotor<double>, points, rest);
     }, nb::arg("points"), nb::arg("rest"));
+    m.def("kirchhoff", &rod_energy, nb::arg("points"), nb::arg("directors"), nb::arg("rest"),
+          nb::arg("twist") = nb::none());
+    m.def("untwisted_directors", &untwisted, nb::arg("points"));
+    m.def("strains", &strains, nb::arg("points"), nb::arg("directors"));
 }
 
 } // namespace ringlet

@@ -41,12 +41,14 @@ class Arena {
 /// What a step changes.
 template <class Real> struct Motion {
     Vec3<Real> *x, *v;
+    Vec3<Real> *m;      // director of segment j, unit
+    Lanes<Real> *twist; // at point i, see kirchhoff.hpp
     Lanes<Real> *T;     // tension of segment j, positive when pulled
     Lanes<Real> *touch; // 1 where the head pushed the point in the last step
 
     Motion(Arena &arena, int P)
-        : x(arena.take<Vec3<Real>>(P)), v(arena.take<Vec3<Real>>(P)), T(arena.take<Lanes<Real>>(P)),
-          touch(arena.take<Lanes<Real>>(P)) {}
+        : x(arena.take<Vec3<Real>>(P)), v(arena.take<Vec3<Real>>(P)), m(arena.take<Vec3<Real>>(P)),
+          twist(arena.take<Lanes<Real>>(P)), T(arena.take<Lanes<Real>>(P)), touch(arena.take<Lanes<Real>>(P)) {}
 };
 
 /// What a step reads: the rest shape of the block's strands.
@@ -55,7 +57,11 @@ template <class Real> struct Block {
     int first = 0;            // points before this one are held in every lane
     bool held_inside = false; // some lane holds a point after that
     Lanes<Real> k_kappa, k_tau, m0, per_mass; // per_mass = 1 / m0
+    Lanes<Real> k_kappa_2, k_ratio;           // "kirchhoff": B2, B2 / B1
     Vec3<Real> *anchor;                 // rest position of a point
+    Vec3<Real> *load;                   // constant force on a point over m0
+    Vec3<Real> *director, *strain;      // "kirchhoff": of segment j; (r1, r2, r3) at point i
+    Lanes<Real> *turns;                 // 1 where the director of segment j is free: not both its ends are held
     Lanes<Real> *l, *dl;                // length of segment j; mean length of the segments beside point i
     Lanes<Real> *inverse_l, *inverse_dl;
     Lanes<Real> *mu, *w;                // mass and mobility of a point, see above
@@ -64,9 +70,10 @@ template <class Real> struct Block {
     Lanes<Real> *C, *S, *G;             // "rotor" about segment i
     Lanes<Real> *root, *inverse_root;   // its sqrt(rho), 1 / sqrt(rho)
 
-    Block(Arena &arena, int points) : P(points), anchor(arena.take<Vec3<Real>>(P)) {
-        for (auto **array : {&l, &dl, &inverse_l, &inverse_dl, &mu, &w, &free, &hand, &offset, &kappa_r, &tau_r, &C, &S,
-                             &G, &root, &inverse_root})
+    Block(Arena &arena, int points) : P(points) {
+        for (auto **array : {&anchor, &load, &director, &strain}) *array = arena.take<Vec3<Real>>(P);
+        for (auto **array : {&turns, &l, &dl, &inverse_l, &inverse_dl, &mu, &w, &free, &hand, &offset, &kappa_r,
+                             &tau_r, &C, &S, &G, &root, &inverse_root})
             *array = arena.take<Lanes<Real>>(P);
     }
 };
@@ -144,6 +151,8 @@ template <class Real> void derive(Block<Real> &b, const RestShape &rest, const i
         leading = leading && !any<Real>(b.free[i] > none);
         if (leading) b.first = i + 1;
         else if (any<Real>(b.free[i] < one)) b.held_inside = true;
+        b.load[i] = b.per_mass * b.load[i];
+        if (i > 0) b.turns[i - 1] = maximum<Real>(b.free[i - 1], b.free[i]);
         if (i < b.P - 1) b.inverse_l[i] = 1 / b.l[i];
         if (i > 0 && i < b.P - 1) b.dl[i] = Real(0.5) * (b.l[i - 1] + b.l[i]), b.inverse_dl[i] = 1 / b.dl[i];
     }
@@ -164,6 +173,11 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
     gather<Real>(b.C + 1, rest.dihedral.data(), P - 3, P - 3, strand);
     gather<Real>(&b.k_kappa, rest.bending.data(), 1, 1, strand);
     gather<Real>(&b.k_tau, rest.twisting.data(), 1, 1, strand);
+    gather<Real>(&b.k_kappa_2, rest.bending_2.data(), 1, 1, strand);
+    b.k_ratio = select<Real>(b.k_kappa > 0, b.k_kappa_2 / b.k_kappa, splat(Real(1)));
+    gather(b.load, rest.load.data(), P, strand);
+    gather(b.director, rest.directors.data(), P - 1, strand);
+    gather(b.strain + 1, rest.strain.data(), P - 2, strand);
     for (int i = 1; i < P - 2; ++i)
         for (int lane = 0; lane < kLanes<Real>; ++lane) {
             Real phi = b.C[i][lane];

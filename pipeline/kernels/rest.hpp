@@ -23,11 +23,14 @@ struct RestShape {
     std::vector<double> length;              // (S, P-1) [m]
     std::vector<double> mass;                // (S, P) [kg]
     std::vector<double> bending, twisting;   // (S,) [N m^2]
+    std::vector<double> bending_2;           // (S,) [N m^2] towards the second director, "kirchhoff"
     std::vector<double> curvature, torsion;  // (S, P-2), (S, P-4) [1/m]
     std::vector<double> dihedral;            // (S, P-3) [rad]
     std::vector<double> ratio, weight;       // (S, P-3) [1], [N m]
     std::vector<uint8_t> held;               // (S, P): 0 free, 1 by the head, 2 by the hand
     std::vector<double> offset;              // (S, P) [m]
+    std::vector<double> directors, strain;   // (S, P-1, 3); (S, P-2, 3) [1, 1, rad], "kirchhoff"
+    std::vector<double> load;                // (S, P, 3) [N]
 };
 
 /// Below this sine a bend has no direction, and its torsion no meaning.

@@ -1,0 +1,207 @@
+// "kirchhoff": an inextensible elastic rod with material frames: its joints, energy, gradient and stiffness.
+//
+// Notation: segment j has the unit tangent t_j and one director m_j, unit and perpendicular to t_j; the second is
+// n_j = t_j x m_j. Joint i joins segment i-1 (t, m, n) and segment i (t', m', n'); p = t.t', dl mean of both lengths.
+//     A = (m.m' + n.n') / (1 + p),   S = (n.m' - m.n') / (1 + p)        cosine and sine of the twist
+//     twist = atan2(S, A) + 2 pi w                                      w: nearest to the twist before
+//     a1 = cos(twist/2) m + sin(twist/2) n,   a2 = cos(twist/2) n - sin(twist/2) m      mid frame, on segment i-1
+//     k_a = 2 a_a.t' / (1 + p)   (|k| = 2 tan(bend/2)),   b_a = a_a - (k_a/2) (t + t')  mid frame, on segment i
+//     E = sum_i [ B1 (k1 - r1)^2 + B2 (k2 - r2)^2 + C (twist - r3)^2 ] / (2 dl)
+// theta_j turns director j about t_j; when points move at fixed theta the directors follow by parallel transport in
+// time. The matrix has the unknowns x_0, s_0, x_1, s_1, ... with s = l theta, so that all have one unit.
+// Source: Bergou et al., "Discrete elastic rods" (2008), "Discrete viscous threads" (2010). We differ: the twist comes
+// from the directors themselves, without reference frame or parallel transport in space; and the curvature is seen in
+// the mid frame instead of the mean of both directors, so that |k| does not depend on the twist and an isotropic
+// straight rod has no bend-twist coupling (test_twist_of_an_isotropic_straight_rod_does_not_bend_it).
+// The rod's stiffness is Gauss-Newton with other twist columns: see `rod_rows`.
+#pragma once
+
+#include "energy.hpp"
+
+#include <initializer_list>
+
+namespace ringlet {
+
+/// 1 + p counts at least this much: a fold sharper than 180 - 0.1 degrees (168 in float32).
+template <class Real> inline constexpr Real kFold = sizeof(Real) == 4 ? Real(1e-2) : Real(1e-6);
+/// The matrix takes this part of a segment's mass as inertia of its spin: a free rod may turn about itself. (That of a
+/// fibre, m r^2 / (2 l^2), is about 1e-5.)
+inline constexpr double kSpin = 1e-4;
+
+/// x rounded to the nearest integer: adding 1.5 2^52 (2^23) leaves no digits after the point.
+template <class Real> RINGLET_INLINE Lanes<Real> nearest(Lanes<Real> x) {
+    constexpr Real shift = sizeof(Real) == 4 ? Real(12582912.0) : Real(6755399441055744.0);
+    return (x + shift) - shift;
+}
+
+/// arctan(u) to 4e-16 for |u| <= tan(pi/8).
+template <class Real> RINGLET_INLINE Lanes<Real> arc_tangent(Lanes<Real> u) {
+    const Lanes<Real> z = u * u;
+    Lanes<Real> sum = splat(Real(0.010755414220443175));
+    for (double c : {-0.034523517295154654, 0.053578965944593965, -0.065721909989094551, 0.076813917746464122,
+                     -0.090900955891864366, 0.11111072759544678, -0.14285713198350578, 0.1999999998327863,
+                     -0.33333333333222487, 0.99999999999999856})
+        sum = sum * z + Real(c);
+    return u * sum;
+}
+
+/// The angle in (-pi, pi] with cosine A and sine S, and cosine and sine of its half; no trigonometry.
+template <class Real> struct HalfAngle {
+    Lanes<Real> angle, cosine, sine;
+
+    RINGLET_INLINE HalfAngle(Lanes<Real> A, Lanes<Real> S) {
+        const Lanes<Real> zero = splat(Real(0)), one = splat(Real(1));
+        const Lanes<Real> scale = 1 / square_root<Real>(A * A + S * S + Real(1e-30));
+        A = A * scale, S = S * scale; // both are off only where 1 + p is clamped
+        const Lanes<Real> sign = select<Real>(S < zero, -one, one);
+        const Mask<Real> acute = A > zero;
+        const Lanes<Real> big = square_root<Real>(Real(0.5) * (1 + maximum<Real>(A, -A)));
+        const Lanes<Real> small = Real(0.5) * sign * S / big;
+        const Lanes<Real> least = 4 * arc_tangent<Real>(small / (1 + big)); // of the angle to 0 or to pi
+        angle = sign * select<Real>(acute, least, Real(3.14159265358979323846) - least);
+        cosine = select<Real>(acute, big, small);
+        sine = sign * select<Real>(acute, small, big);
+    }
+};
+
+/// Kinematics of one joint.
+template <class Real> struct Joint {
+    using L = Lanes<Real>;
+    Vec3<Real> a1, a2; // mid frame on the segment before
+    L k1, k2, twist;
+
+    Joint() = default;
+
+    /// Of two unit tangents and their directors; of all windings the one nearest to the twist `before`. An odd number
+    /// of turns turns the mid frame by half a turn.
+    RINGLET_INLINE Joint(Vec3<Real> t0, Vec3<Real> t1, Vec3<Real> m0, Vec3<Real> m1, L before) {
+        constexpr Real turn = Real(6.28318530717958647692);
+        const Vec3<Real> n0 = cross(t0, m0), n1 = cross(t1, m1);
+        const L inverse = 1 / maximum<Real>(1 + dot(t0, t1), splat(kFold<Real>));
+        const HalfAngle<Real> half(inverse * (dot(m0, m1) + dot(n0, n1)), inverse * (dot(n0, m1) - dot(m0, n1)));
+        const L turns = nearest<Real>((before - half.angle) * (1 / turn));
+        const Mask<Real> even = turns == 2 * nearest<Real>(Real(0.5) * turns);
+        const L c = select<Real>(even, half.cosine, -half.cosine), s = select<Real>(even, half.sine, -half.sine);
+        twist = half.angle + turn * turns;
+        a1 = c * m0 + s * n0, a2 = c * n0 - s * m0;
+        k1 = 2 * inverse * dot(a1, t1), k2 = 2 * inverse * dot(a2, t1);
+    }
+
+    /// Curvature binormal k1 a2 - k2 a1.
+    RINGLET_INLINE Vec3<Real> binormal() const { return k1 * a2 - k2 * a1; }
+};
+
+/// What a joint's strains deviate from rest, as moments: M_a = B_a (k_a - r_a) / dl, Q = C (twist - r3) / dl.
+template <class Real> struct Moments {
+    Lanes<Real> M1, M2, Q;
+
+    RINGLET_INLINE Moments(const Block<Real> &b, int i, const Joint<Real> &joint) {
+        const Lanes<Real> per_length = 1 / b.dl[i];
+        M1 = b.k_kappa * per_length * (joint.k1 - b.strain[i].x);
+        M2 = b.k_kappa_2 * per_length * (joint.k2 - b.strain[i].y);
+        Q = b.k_tau * per_length * (joint.twist - b.strain[i].z);
+    }
+};
+
+/// The rod at some points and directors.
+template <class Real> struct Rod {
+    Joint<Real> *joint;  // entries 1 .. P-2
+    Lanes<Real> *by_theta; // gradient of the energy by theta_j
+    Lanes<Real> bending{}, twisting{}; // energies
+
+    Rod(Arena &arena, int P) : joint(arena.take<Joint<Real>>(P)), by_theta(arena.take<Lanes<Real>>(P)) {}
+};
+
+/// Adds the gradient by the tangents to the edges, D_j; sets joints, energies and the gradient by theta. With
+/// h = (M1 k1 + M2 k2) / 4 and the binormal kb:
+///     dE/dt  = -(M1 + h k1) a1 - (M2 + h k2) a2 + (Q/2) kb,    dE/dtheta_{i-1} = (M1 k2 - M2 k1) / 2 - Q
+///     dE/dt' = +(M1 + h k1) b1 + (M2 + h k2) b2 + (Q/2) kb,    dE/dtheta_i     = (M1 k2 - M2 k1) / 2 + Q
+template <class Real>
+void add_rod(const Block<Real> &b, const Vec3<Real> *m, const Lanes<Real> *twist, Edges<Real> &edges, Rod<Real> &rod) {
+    rod.bending = rod.twisting = Lanes<Real>{};
+    for (int j = 0; j < b.P; ++j) rod.by_theta[j] = Lanes<Real>{};
+    for (int i = 1; i < b.P - 1; ++i) {
+        const Vec3<Real> t0 = edges.d[i - 1], t1 = edges.d[i];
+        const Joint<Real> q(t0, t1, m[i - 1], m[i], twist[i]);
+        const Moments<Real> at(b, i, q);
+        rod.joint[i] = q;
+        rod.bending += Real(0.5) * (at.M1 * (q.k1 - b.strain[i].x) + at.M2 * (q.k2 - b.strain[i].y));
+        rod.twisting += Real(0.5) * at.Q * (q.twist - b.strain[i].z);
+        const Lanes<Real> h = Real(0.25) * (at.M1 * q.k1 + at.M2 * q.k2), u1 = at.M1 + h * q.k1, u2 = at.M2 + h * q.k2;
+        const Vec3<Real> across = u1 * q.a1 + u2 * q.a2, twisted = (Real(0.5) * at.Q) * q.binormal();
+        edges.D[i - 1] = edges.D[i - 1] - across + twisted;
+        edges.D[i] = edges.D[i] + across - (Real(0.5) * (u1 * q.k1 + u2 * q.k2)) * (t0 + t1) + twisted;
+        const Lanes<Real> both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1);
+        rod.by_theta[i - 1] += both - at.Q;
+        rod.by_theta[i] += both + at.Q;
+    }
+}
+
+/// Exact second derivative of a joint's bending energy by a common turn of its two directors, times dl.
+template <class Real>
+RINGLET_INLINE Lanes<Real> turning_stiffness(const Block<Real> &b, int i, const Joint<Real> &q) {
+    const Lanes<Real> B1 = b.k_kappa, B2 = b.k_kappa_2;
+    return (B1 - B2) * (q.k2 * q.k2 - q.k1 * q.k1) + B1 * b.strain[i].x * q.k1 + B2 * b.strain[i].y * q.k2;
+}
+
+/// The three Gauss-Newton rows of a joint: derivatives of k1, k2 and twist by x_{i-1}, s_{i-1}, x_i, s_i, x_{i+1}.
+/// The twist columns of k1 and k2 are not the exact ones, k2/2 and -k1/2: with
+///     (k2 - f1 (k2 - r2)) / 2,  (f2 (k1 - r1) - k1) / 2,      f1 = min(1, B2/B1), f2 = min(1, B1/B2)
+/// K stays positive, the block of points and twist is exact for B1 = B2, and turning an isotropic section costs nothing.
+template <class Real> struct RodRows {
+    using L = Lanes<Real>;
+    L row[3][11];
+    L turning; // what the exact stiffness of a common turn has on top, for each of the four entries of s and s
+
+    RINGLET_INLINE RodRows(const Block<Real> &b, const Edges<Real> &edges, int i, const Joint<Real> &q) {
+        const L il0 = edges.il[i - 1], il1 = edges.il[i], B1 = b.k_kappa, B2 = b.k_kappa_2, one = splat(Real(1));
+        const Vec3<Real> tt = edges.d[i - 1] + edges.d[i], kb = Real(0.5) * q.binormal();
+        const L f1 = minimum<Real>(one, b.k_ratio), f2 = minimum<Real>(one, 1 / b.k_ratio); // k_ratio = B2 / B1
+        const L c1 = Real(0.5) * (q.k2 - f1 * (q.k2 - b.strain[i].y));
+        const L c2 = Real(0.5) * (f2 * (q.k1 - b.strain[i].x) - q.k1);
+        const Vec3<Real> qa = q.k1 * q.a1 + q.k2 * q.a2;
+        const Vec3<Real> qb = qa - (Real(0.5) * (q.k1 * q.k1 + q.k2 * q.k2)) * tt;
+        set(0, -il0 * (q.a1 + (Real(0.25) * q.k1) * qa),
+            il1 * (q.a1 - (Real(0.5) * q.k1) * tt + (Real(0.25) * q.k1) * qb), c1 * il0, c1 * il1);
+        set(1, -il0 * (q.a2 + (Real(0.25) * q.k2) * qa),
+            il1 * (q.a2 - (Real(0.5) * q.k2) * tt + (Real(0.25) * q.k2) * qb), c2 * il0, c2 * il1);
+        set(2, il0 * kb, il1 * kb, -il0, il1);
+        const L more = turning_stiffness(b, i, q) - 4 * (B1 * c1 * c1 + B2 * c2 * c2);
+        turning = Real(0.25) * maximum<Real>(more, splat(Real(0)));
+    }
+
+  private:
+    /// Entries of a row from its derivatives by the two tangents (over the lengths) and the two s.
+    RINGLET_INLINE void set(int r, Vec3<Real> D0, Vec3<Real> D1, L s0, L s1) {
+        const Vec3<Real> middle = D0 - D1;
+        L *g = row[r];
+        g[0] = -D0.x, g[1] = -D0.y, g[2] = -D0.z, g[3] = s0;
+        g[4] = middle.x, g[5] = middle.y, g[6] = middle.z, g[7] = s1;
+        g[8] = D1.x, g[9] = D1.y, g[10] = D1.z;
+    }
+};
+
+/// Adds scale times the stiffness of joint i to rows 4 (i-1) and on of a banded matrix.
+template <class Real, class Matrix>
+RINGLET_INLINE void add_joint_stiffness(const Block<Real> &b, const Edges<Real> &edges, int i, const Joint<Real> &q,
+                                        Lanes<Real> scale, Matrix &A) {
+    const RodRows<Real> rows(b, edges, i, q);
+    const Lanes<Real> per_length = scale / b.dl[i];
+    const Lanes<Real> weight[3] = {per_length * b.k_kappa, per_length * b.k_kappa_2, per_length * b.k_tau};
+#pragma GCC unroll 11
+    for (int r = 0; r < 11; ++r) {
+        Lanes<Real> *to = A.row(4 * (i - 1) + r);
+        const Lanes<Real> w0 = weight[0] * rows.row[0][r], w1 = weight[1] * rows.row[1][r],
+                          w2 = weight[2] * rows.row[2][r];
+#pragma GCC unroll 11
+        for (int c = r; c < 11; ++c)
+            to[c - r] += w0 * rows.row[0][c] + w1 * rows.row[1][c] + w2 * rows.row[2][c];
+    }
+    const Lanes<Real> il0 = edges.il[i - 1], il1 = edges.il[i], turning = per_length * rows.turning;
+    Lanes<Real> *before = A.row(4 * i - 1), *after = A.row(4 * i + 3);
+    before[0] += turning * il0 * il0;
+    before[4] += turning * il0 * il1;
+    after[0] += turning * il1 * il1;
+}
+
+} // namespace ringlet
