@@ -69,7 +69,9 @@ class RestShape:
     mass: _F64
     """(S, P) [kg]."""
     bending: _F64
-    """(S,) [N m^2]: k_kappa = E I."""
+    """(S,) [N m^2]: k_kappa = E I; for torsion "kirchhoff" towards the directors."""
+    bending_2: _F64
+    """(S,) [N m^2]: for "kirchhoff" across the directors; as `bending` where the section is round."""
     twisting: _F64
     """(S,) [N m^2]: k_tau = G J; 0 switches torsion off for a strand."""
     curvature: _F64
@@ -86,6 +88,12 @@ class RestShape:
     """(S, P): 0 free, 1 carried by the head's pose, 2 carried by the hand's pose. Any points may be held."""
     offset: _F64
     """(S, P) [m]: distance that the point keeps from the head's surface."""
+    directors: _F64
+    """(S, P-1, 3): rest directors of the segments, where held segments carry theirs from; for "kirchhoff"."""
+    strain: _F64
+    """(S, P-2, 3): rest strains k1, k2 and twist [rad] of the joints at points 1 .. P-2, for "kirchhoff": see `strains`."""
+    load: _F64
+    """(S, P, 3) [N]: constant force on every point, in the world; 0 by default."""
 
 def rest_shape(
     points: _F64,
@@ -123,10 +131,41 @@ def torsion_frenet(points: _F64, rest: RestShape) -> tuple[_F64, _F64]:
 def torsion_rotor(points: _F64, rest: RestShape) -> tuple[_F64, _F64]:
     """Energy (S,) [J] and force (S, P, 3) [N] of the 4-point polynomial torsion with one minimum."""
 
-class State:
-    """Where the strands are: four arrays, all of one precision, advanced in place.
+def kirchhoff(
+    points: _F64, directors: _F64, rest: RestShape, twist: _F64 | None = None
+) -> tuple[_F64, _F64, _F64]:
+    """Energy of elastic rods with material frames, sum [B1 (k1-r1)^2 + B2 (k2-r2)^2 + C (twist-r3)^2] / (2 dl).
 
-    Saving and restoring these four arrays resumes a simulation bit by bit. The arrays given are held, not
+    Args:
+        points: (S, P, 3) float64 [m].
+        directors: (S, P-1, 3) float64, unit and square to their segments.
+        rest: stiffness and rest strains.
+        twist: (S, P-2) float64 [rad]: of all windings the one nearest to this counts; unset, the smallest twist.
+
+    Returns:
+        Energy (S,) [J], force (S, P, 3) [N], minus the gradient by points at parallel transported directors, and
+        gradient (S, P-1) [N m] by turns of the directors about their segments.
+
+    Source: Bergou et al., "Discrete elastic rods" (2008); "Discrete viscous threads" (2010).
+
+    """
+
+def untwisted_directors(points: _F64) -> _F64:
+    """Directors (S, P-1, 3) without twist along points (S, P, 3) float64 [m], P >= 2; the first is fixed by its segment."""
+
+def strains(points: _F64, directors: _F64) -> _F64:
+    """Integrated strains (S, P-2, 3) of the joints: k1, k2 (|k| = 2 tan(bend/2)) and the smallest twist [rad].
+
+    Args:
+        points: (S, P, 3) float64 [m], P >= 3.
+        directors: (S, P-1, 3) float64, unit and square to their segments.
+
+    """
+
+class State:
+    """Where the strands are: six arrays, of numbers all in one precision, advanced in place.
+
+    Saving and restoring these six arrays resumes a simulation bit by bit. The arrays given are held, not
     copied: attributes are views of them.
     """
 
@@ -138,13 +177,27 @@ class State:
     """(S, P-1) [N]: carried from step to step, so that equilibria do not depend on dt."""
     contact: NDArray[np.uint8]
     """(S, P): 1 where the head pushed the point in the last step."""
+    directors: _Real
+    """(S, P-1, 3): unit director of every segment, world; only torsion "kirchhoff" changes them."""
+    twist: _Real
+    """(S, P-2) [rad]: twist of every joint with its whole turns; only torsion "kirchhoff" changes it."""
 
     def __init__(
-        self, points: _Real, velocity: _Real, tension: _Real, contact: NDArray[np.uint8]
+        self,
+        points: _Real,
+        velocity: _Real,
+        tension: _Real,
+        contact: NDArray[np.uint8],
+        directors: _Real,
+        twist: _Real,
     ) -> None: ...
 
-def at_rest(points: _Real) -> State:
-    """A state at these points (copied; their precision is that of the simulation): no velocity, tension, contact."""
+def at_rest(points: _Real, directors: _Real | None = None) -> State:
+    """A state at these points (copied; their precision is that of the simulation): no velocity, tension, contact.
+
+    Without `directors` (S, P-1, 3) they are `untwisted_directors` of the points. Where the head's first pose is not the
+    identity, pass the rest shape's, turned by it: held directors turn to where the head holds them in the first step.
+    """
 
 class DistanceField:
     """Signed distance to the head on a grid, negative inside; trilinear between nodes, clamped outside.
@@ -165,7 +218,7 @@ class StepSettings:
     theta: float  # 0.6: implicitness, 0.5 .. 1
     gravity: tuple[float, float, float]  # (0, -9.81, 0) [m/s^2]
     damping: float  # 3e-3 s: beta, internal
-    torsion: Literal["rotor", "frenet", "none"]  # "rotor"
+    torsion: Literal["kirchhoff", "rotor", "frenet", "none"]  # "rotor"
     relaxation: Literal["newton", "sweep"]  # "newton"
     tolerance: float  # 1e-4: worst relative length error of a segment
     friction: float  # 0.3: Coulomb, hair on head
@@ -223,7 +276,10 @@ def advance(
     """
 
 def energies(state: State, rest: RestShape, settings: StepSettings) -> _F64:
-    """(S, 4) float64 [J]: bending, torsion, kinetic and gravity energy of every strand (gravity: 0 at the origin)."""
+    """(S, 4) float64 [J]: bending, torsion, kinetic and gravity energy of every strand.
+
+    For "kirchhoff" torsion is the energy of twist. Gravity is 0 at the origin and holds the energy of the load.
+    """
 
 def relax(
     points: _F64, rest: RestShape, method: Literal["newton", "sweep"], tolerance: float

@@ -16,6 +16,7 @@ namespace ringlet {
 template <class Real> struct StateArrays {
     Real *points, *velocity, *tension;
     uint8_t *contact;
+    Real *directors, *twist;
 };
 
 /// What moves the strands: `steps + 1` poses of head and hand, `steps` winds.
@@ -38,6 +39,8 @@ void read(Motion<Real> &motion, const StateArrays<Real> &state, int P, const Blo
     gather(motion.v, state.velocity, P, index.strand);
     gather<Real>(motion.T, state.tension, P - 1, P - 1, index.strand);
     gather<Real>(motion.touch, state.contact, P, P, index.strand);
+    gather(motion.m, state.directors, P - 1, index.strand);
+    gather<Real>(motion.twist + 1, state.twist, P - 2, P - 2, index.strand);
 }
 
 template <class Real>
@@ -46,6 +49,8 @@ void write(const Motion<Real> &motion, StateArrays<Real> &state, int P, const Bl
     scatter(motion.v, state.velocity, P, index);
     scatter<Real>(motion.T, state.tension, P - 1, index);
     scatter<Real>(motion.touch, state.contact, P, index);
+    scatter(motion.m, state.directors, P - 1, index);
+    scatter<Real>(motion.twist + 1, state.twist, P - 2, index);
 }
 
 /// Lanes that hold a strand of their own (the last block repeats its last strand).

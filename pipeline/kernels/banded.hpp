@@ -83,7 +83,7 @@ template <class Real, int Unknowns_, int Band_> struct Window {
     /// Takes known values of the first point out of the system where `held` is 1: its rows become the identity's.
     void impose(const L (&held)[Unknowns], const L (&known)[Unknowns]) {
         for (int a = 0; a < Unknowns; ++a) {
-            const L value = held[a] * known[a], keep = 1 - held[a];
+            const L value = select<Real>(held[a] > 0, known[a], L{}), keep = 1 - held[a];
             for (int k = 0; k < Band; ++k) {
                 if (k == a) continue;
                 L &entry = k < a ? at(k, a) : at(a, k);

@@ -81,16 +81,7 @@ static Doubles untwisted(const Points &points) {
     const int S = int(points.shape(0)), P = int(points.shape(1));
     require(P >= 2, "points: expected at least 2 points a strand");
     auto directors = new_array<double>({size_t(S), size_t(P) - 1, 3});
-    Arena arena(sizeof(Lanes<double>) * 16 * (P + 8));
-    Edges<double> edges(arena, P);
-    auto *x = arena.take<Vec3<double>>(P), *m = arena.take<Vec3<double>>(P);
-    for (int k = 0; k < block_count<double>(S); ++k) {
-        const BlockIndex<double> index(k, S);
-        gather(x, points.data(), P, index.strand);
-        edges.set(x, P);
-        untwisted_directors(edges, P, m);
-        scatter(m, directors.data(), P - 1, index);
-    }
+    untwisted_directors(points.data(), S, P, directors.data());
     return directors;
 }
 
@@ -128,7 +119,6 @@ static std::tuple<Doubles, Doubles, Doubles> rod_energy(const Points &points, co
     Block<double> block(arena, rest.P);
     Motion<double> at(arena, rest.P);
     Edges<double> edges(arena, rest.P);
-    Rod<double> rod(arena, rest.P);
     auto *f = arena.take<Vec3<double>>(P);
     for (int k = 0; k < block_count<double>(rest.S); ++k) {
         const BlockIndex<double> index(k, rest.S);
@@ -138,12 +128,12 @@ static std::tuple<Doubles, Doubles, Doubles> rod_energy(const Points &points, co
         if (twist) gather<double>(at.twist + 1, twist->data(), rest.P - 2, rest.P - 2, index.strand);
         edges.set(at.x, rest.P);
         for (size_t i = 0; i < P; ++i) f[i] = Vec3<double>{};
-        add_rod(block, at.m, at.twist, edges, rod);
+        const RodEnergy<double> rod = add_rod(block, at.m, at.twist, edges);
         add_edge_forces(edges, rest.P, f);
         const Lanes<double> energy = rod.bending + rod.twisting;
         scatter(&energy, values.data(), 1, index);
         scatter(f, forces.data(), rest.P, index);
-        scatter(rod.by_theta, turning.data(), rest.P - 1, index);
+        scatter(edges.D_theta, turning.data(), rest.P - 1, index);
     }
     return {values, forces, turning};
 }

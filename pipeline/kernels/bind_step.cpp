@@ -25,6 +25,7 @@ using Matrices = Array<const double, -1, 4, 4>;
 struct State {
     Reals points, velocity, tension;
     Flags contact;
+    Reals directors, twist;
 
     size_t S() const { return points.shape(0); }
     size_t P() const { return points.shape(1); }
@@ -32,40 +33,52 @@ struct State {
 
     template <class Real> StateArrays<Real> arrays() const {
         return {static_cast<Real *>(points.data()), static_cast<Real *>(velocity.data()),
-                static_cast<Real *>(tension.data()), contact.data()};
+                static_cast<Real *>(tension.data()), contact.data(), static_cast<Real *>(directors.data()),
+                static_cast<Real *>(twist.data())};
     }
 };
 
 static bool is_points(const Reals &a) { return a.ndim() == 3 && a.shape(2) == 3; }
 
-static State make_state(Reals points, Reals velocity, Reals tension, Flags contact) {
+static State make_state(Reals points, Reals velocity, Reals tension, Flags contact, Reals directors, Reals twist) {
     require(is_points(points) && is_points(velocity), "State: expected points and velocity (S, P, 3)");
     const size_t S = points.shape(0), P = points.shape(1);
     require(velocity.shape(0) == S && velocity.shape(1) == P, "State: velocity has another shape than points");
     require(tension.ndim() == 2 && tension.shape(0) == S && tension.shape(1) + 1 == P,
             "State: expected tension (S, P-1)");
     require(contact.shape(0) == S && contact.shape(1) == P, "State: expected contact (S, P)");
+    require(is_points(directors) && directors.shape(0) == S && directors.shape(1) + 1 == P,
+            "State: expected directors (S, P-1, 3)");
+    require(twist.ndim() == 2 && twist.shape(0) == S && twist.shape(1) + 2 == P, "State: expected twist (S, P-2)");
     require(points.dtype() == nb::dtype<float>() || points.dtype() == nb::dtype<double>(),
             "State: expected float32 or float64");
-    require(velocity.dtype() == points.dtype() && tension.dtype() == points.dtype(),
-            "State: points, velocity and tension must have one precision");
-    return {points, velocity, tension, contact};
+    for (const Reals *array : {&velocity, &tension, &directors, &twist})
+        require(array->dtype() == points.dtype(), "State: arrays of numbers must have one precision");
+    return {points, velocity, tension, contact, directors, twist};
 }
 
-template <class Real> static State resting(const Reals &points) {
+/// A state without velocity; directors (S, P-1, 3) may be null.
+template <class Real> static State resting(const Reals &points, const Real *directors) {
     const size_t S = points.shape(0), P = points.shape(1);
     auto x = new_array<Real>({S, P, size_t(3)}), v = new_array<Real>({S, P, size_t(3)});
     auto T = new_array<Real>({S, P - 1});
     auto contact = new_array<uint8_t>({S, P});
+    auto m = new_array<Real>({S, P - 1, size_t(3)}), twist = new_array<Real>({S, P - 2});
     std::copy_n(static_cast<const Real *>(points.data()), S * P * 3, x.data());
-    return {Reals(x), Reals(v), Reals(T), Flags(contact)};
+    if (directors) std::copy_n(directors, S * (P - 1) * 3, m.data());
+    else untwisted_directors(x.data(), int(S), int(P), m.data());
+    return {Reals(x), Reals(v), Reals(T), Flags(contact), Reals(m), Reals(twist)};
 }
 
-static State at_rest(const Reals &points) {
-    require(is_points(points), "at_rest: expected points (S, P, 3)");
-    if (points.dtype() == nb::dtype<float>()) return resting<float>(points);
+static State at_rest(const Reals &points, const std::optional<Reals> &directors) {
+    require(is_points(points) && points.shape(1) >= 2, "at_rest: expected points (S, P, 3)");
+    require(!directors || (is_points(*directors) && directors->shape(0) == points.shape(0) &&
+                           directors->shape(1) + 1 == points.shape(1) && directors->dtype() == points.dtype()),
+            "at_rest: expected directors (S, P-1, 3) in the precision of the points");
+    const void *m = directors ? directors->data() : nullptr;
+    if (points.dtype() == nb::dtype<float>()) return resting<float>(points, static_cast<const float *>(m));
     require(points.dtype() == nb::dtype<double>(), "at_rest: expected float32 or float64");
-    return resting<double>(points);
+    return resting<double>(points, static_cast<const double *>(m));
 }
 
 static DistanceField make_field(Array<const float, -1, -1, -1> values, Array<const double, 3> origin, double spacing) {
@@ -137,17 +150,22 @@ static Report advance_state(State &state, const RestShape &rest, const DistanceF
     return advance(state.arrays<double>(), rest, field, drive, settings, threads());
 }
 
-/// Bending, torsion, kinetic and gravity energy of a block of strands.
+/// Bending, torsion, kinetic and gravity energy of a block of strands; the load counts as gravity.
 static void block_energies(const Block<double> &b, const Motion<double> &at, const StepSettings &settings,
                            Edges<double> &edges, Lanes<double> (&energy)[4]) {
     const Vec3<double> g = broadcast<double>(settings.gravity);
     edges.set(at.x, b.P);
-    energy[0] = add_bending(b, edges);
-    energy[1] = add_torsion(settings.torsion, b, edges);
+    if (settings.torsion == Torsion::kirchhoff) {
+        const RodEnergy<double> rod = add_rod(b, at.m, at.twist, edges);
+        energy[0] = rod.bending, energy[1] = rod.twisting;
+    } else {
+        energy[0] = add_bending(b, edges);
+        energy[1] = add_torsion(settings.torsion, b, edges);
+    }
     energy[2] = energy[3] = Lanes<double>{};
     for (int i = 0; i < b.P; ++i) {
         energy[2] += 0.5 * b.mu[i] * b.m0 * dot(at.v[i], at.v[i]);
-        energy[3] -= b.mu[i] * b.m0 * dot(g, at.x[i]);
+        energy[3] -= b.m0 * dot(b.mu[i] * g + b.load[i], at.x[i]);
     }
 }
 
@@ -155,7 +173,7 @@ template <class Real>
 static Doubles energies_of(const State &state, const RestShape &rest, const StepSettings &settings) {
     const int P = rest.P;
     auto values = new_array<double>({size_t(rest.S), 4});
-    Arena arena(sizeof(Lanes<double>) * 64 * (P + 8));
+    Arena arena(sizeof(Lanes<double>) * 96 * (P + 8));
     Block<double> block(arena, P);
     Motion<double> at(arena, P);
     Edges<double> edges(arena, P);
@@ -166,6 +184,8 @@ static Doubles energies_of(const State &state, const RestShape &rest, const Step
         read(block, rest, index);
         gather(at.x, arrays.points, P, index.strand);
         gather(at.v, arrays.velocity, P, index.strand);
+        gather(at.m, arrays.directors, P - 1, index.strand);
+        gather<double>(at.twist + 1, arrays.twist, P - 2, P - 2, index.strand);
         block_energies(block, at, settings, edges, energy);
         scatter<double>(energy, values.data(), 4, index);
     }
@@ -183,7 +203,7 @@ static Relaxation relaxation_named(const std::string &name) {
 }
 
 static const std::map<std::string, Torsion> kTorsions = {
-    {"none", Torsion::none}, {"frenet", Torsion::frenet}, {"rotor", Torsion::rotor}};
+    {"none", Torsion::none}, {"frenet", Torsion::frenet}, {"rotor", Torsion::rotor}, {"kirchhoff", Torsion::kirchhoff}};
 
 static std::string torsion_name(const StepSettings &settings) {
     for (const auto &[name, torsion] : kTorsions)
@@ -192,7 +212,7 @@ static std::string torsion_name(const StepSettings &settings) {
 }
 
 static void set_torsion(StepSettings &settings, const std::string &name) {
-    require(kTorsions.contains(name), "torsion: expected \"rotor\", \"frenet\" or \"none\"");
+    require(kTorsions.contains(name), "torsion: expected \"kirchhoff\", \"rotor\", \"frenet\" or \"none\"");
     settings.torsion = kTorsions.at(name);
 }
 
@@ -203,7 +223,7 @@ static std::tuple<Doubles, int> relax(Array<const double, -1, -1, 3> points, con
     const bool newton = relaxation_named(method) == Relaxation::newton;
     const int P = rest.P;
     auto relaxed = new_array<double>({size_t(rest.S), size_t(P), 3});
-    Arena arena(sizeof(Lanes<double>) * 64 * (P + 8));
+    Arena arena(sizeof(Lanes<double>) * 96 * (P + 8));
     Block<double> block(arena, P);
     Contacts<double> contacts(arena, P);
     Lengths<double> lengths(arena, P);
@@ -255,14 +275,17 @@ static void bind_settings(nb::module_ &m) {
 
 static void bind_values(nb::module_ &m) {
     nb::class_<State>(m, "State")
-        .def("__init__", [](State *self, Reals points, Reals velocity, Reals tension, Flags contact) {
-            new (self) State(make_state(points, velocity, tension, contact));
+        .def("__init__", [](State *self, Reals points, Reals velocity, Reals tension, Flags contact, Reals directors,
+                            Reals twist) {
+            new (self) State(make_state(points, velocity, tension, contact, directors, twist));
         }, nb::arg("points").noconvert(), nb::arg("velocity").noconvert(), nb::arg("tension").noconvert(),
-             nb::arg("contact").noconvert())
+             nb::arg("contact").noconvert(), nb::arg("directors").noconvert(), nb::arg("twist").noconvert())
         .def_prop_ro("points", [](State &state) { return state.points; }, nb::rv_policy::automatic)
         .def_prop_ro("velocity", [](State &state) { return state.velocity; }, nb::rv_policy::automatic)
         .def_prop_ro("tension", [](State &state) { return state.tension; }, nb::rv_policy::automatic)
-        .def_prop_ro("contact", [](State &state) { return state.contact; }, nb::rv_policy::automatic);
+        .def_prop_ro("contact", [](State &state) { return state.contact; }, nb::rv_policy::automatic)
+        .def_prop_ro("directors", [](State &state) { return state.directors; }, nb::rv_policy::automatic)
+        .def_prop_ro("twist", [](State &state) { return state.twist; }, nb::rv_policy::automatic);
     nb::class_<DistanceField>(m, "DistanceField")
         .def("__init__", [](DistanceField *self, Array<const float, -1, -1, -1> values, Array<const double, 3> origin,
                             double spacing) { new (self) DistanceField(make_field(values, origin, spacing)); },
@@ -285,7 +308,7 @@ static void bind_values(nb::module_ &m) {
 void bind_step(nb::module_ &m) {
     bind_values(m);
     bind_settings(m);
-    m.def("at_rest", &at_rest, nb::arg("points"));
+    m.def("at_rest", &at_rest, nb::arg("points"), nb::arg("directors") = nb::none());
     m.def("distance", &distance, nb::arg("field"), nb::arg("points"));
     m.def("advance", &advance_state, nb::arg("state"), nb::arg("rest"), nb::arg("field").none(), nb::arg("drive"),
           nb::arg("settings"));

@@ -57,7 +57,7 @@ template <class Real> struct Block {
     int first = 0;            // points before this one are held in every lane
     bool held_inside = false; // some lane holds a point after that
     Lanes<Real> k_kappa, k_tau, m0, per_mass; // per_mass = 1 / m0
-    Lanes<Real> k_kappa_2, k_ratio;           // "kirchhoff": B2, B2 / B1
+    Lanes<Real> k_kappa_2, k_ratio, inverse_ratio; // "kirchhoff": B2, B2 / B1, B1 / B2
     Vec3<Real> *anchor;                 // rest position of a point
     Vec3<Real> *load;                   // constant force on a point over m0
     Vec3<Real> *director, *strain;      // "kirchhoff": of segment j; (r1, r2, r3) at point i
@@ -174,7 +174,9 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
     gather<Real>(&b.k_kappa, rest.bending.data(), 1, 1, strand);
     gather<Real>(&b.k_tau, rest.twisting.data(), 1, 1, strand);
     gather<Real>(&b.k_kappa_2, rest.bending_2.data(), 1, 1, strand);
-    b.k_ratio = select<Real>(b.k_kappa > 0, b.k_kappa_2 / b.k_kappa, splat(Real(1)));
+    const Lanes<Real> one = splat(Real(1));
+    b.k_ratio = select<Real>(b.k_kappa > 0, b.k_kappa_2 / b.k_kappa, one);
+    b.inverse_ratio = select<Real>(b.k_kappa_2 > 0, b.k_kappa / b.k_kappa_2, one);
     gather(b.load, rest.load.data(), P, strand);
     gather(b.director, rest.directors.data(), P - 1, strand);
     gather(b.strain + 1, rest.strain.data(), P - 2, strand);

@@ -18,9 +18,11 @@ namespace ringlet {
 template <class Real> struct Edges {
     Vec3<Real> *d, *D;
     Lanes<Real> *il;
+    Lanes<Real> *D_theta; // gradient by a turn of the director
 
     Edges(Arena &arena, int P)
-        : d(arena.take<Vec3<Real>>(P)), D(arena.take<Vec3<Real>>(P)), il(arena.take<Lanes<Real>>(P)) {}
+        : d(arena.take<Vec3<Real>>(P)), D(arena.take<Vec3<Real>>(P)), il(arena.take<Lanes<Real>>(P)),
+          D_theta(arena.take<Lanes<Real>>(P)) {}
 
     /// Unit edges of the points; gradients start from zero.
     void set(const Vec3<Real> *x, int P) {
@@ -28,7 +30,7 @@ template <class Real> struct Edges {
             Vec3<Real> edge = x[j + 1] - x[j];
             il[j] = inverse_root<Real>(dot(edge, edge));
             d[j] = il[j] * edge;
-            D[j] = Vec3<Real>{};
+            D[j] = Vec3<Real>{}, D_theta[j] = Lanes<Real>{};
         }
     }
 };

@@ -3,11 +3,13 @@
 // physics.md section 3 solves  [M (1 + theta dt c) + H] dv = dt [f + M g - c M (v - wind)] - H v / theta  with
 // H = theta dt (theta dt + beta) K. We solve for u = v + theta dv, which needs no product H v:
 //     [M (1 + theta dt c) + H] u = M v + theta dt [f + M (g + c wind)],      x* = x + dt u
+// "kirchhoff" has s = l theta of every segment as a fourth unknown of its first point: no mass, its velocity from 0.
 // Everything is divided by the strand's mean mass m0. The tension T is carried: T += k_s dt d.(u_{j+1} - u_j).
 // Forces, matrix and elimination are one sweep over the points from the root: see banded.hpp.
 #pragma once
 
 #include "contact.hpp"
+#include "kirchhoff.hpp"
 #include "settings.hpp"
 #include "stiffness.hpp"
 
@@ -37,16 +39,20 @@ RINGLET_INLINE Vec3<Real> edge_force(const Edges<Real> &edges, const Lanes<Real>
     return turning(edges.D[j], edges.d[j], edges.il[j]) + T[j] * edges.d[j];
 }
 
-/// Elastic and tension forces over m0, P entries.
+/// Elastic and tension forces and the load, over m0, P entries.
 template <class Real>
-void internal_forces(const Block<Real> &b, const StepSettings &settings, const Lanes<Real> *T, Edges<Real> &edges,
-                     Vec3<Real> *f) {
-    add_bending(b, edges);
-    add_torsion(settings.torsion, b, edges);
+void steady_forces(const Block<Real> &b, const StepSettings &settings, const Motion<Real> &from, Edges<Real> &edges,
+                   Vec3<Real> *f) {
+    if (settings.torsion == Torsion::kirchhoff) {
+        add_rod(b, from.m, from.twist, edges);
+    } else {
+        add_bending(b, edges);
+        add_torsion(settings.torsion, b, edges);
+    }
     Vec3<Real> before{};
     for (int j = 0; j < b.P; ++j) {
-        const Vec3<Real> now = j < b.P - 1 ? edge_force(edges, T, j) : Vec3<Real>{};
-        f[j] = b.per_mass * (now - before);
+        const Vec3<Real> now = j < b.P - 1 ? edge_force(edges, from.T, j) : Vec3<Real>{};
+        f[j] = b.load[j] + b.per_mass * (now - before);
         before = now;
     }
 }
@@ -59,7 +65,13 @@ template <class Real> struct Equation {
     const StepSettings &settings;
     const Contacts<Real> &contacts;
     Edges<Real> &edges;
-    Vec3<Real> *f; // internal forces over m0
+    Vec3<Real> *f; // steady forces over m0
+};
+
+/// What is solved for; held points and directors know theirs.
+template <class Real> struct Velocities {
+    Vec3<Real> *u;
+    Lanes<Real> *spin; // of s, "kirchhoff" only
 };
 
 /// Mass, drag, the row of a contact on the diagonal, and the right side of point i.
@@ -84,57 +96,89 @@ RINGLET_INLINE void add_point(const Equation<Real> &eq, int i, Window &window) {
 
 /// Unknowns that the terms beginning at one point reach.
 template <Torsion torsion>
-inline constexpr int kBand = torsion == Torsion::rotor ? 12 : torsion == Torsion::frenet ? 15 : 9;
+inline constexpr int kBand = torsion == Torsion::rotor       ? 12
+                             : torsion == Torsion::frenet    ? 15
+                             : torsion == Torsion::kirchhoff ? 11
+                                                             : 9;
 
 /// The solver of one torsion model; it has memory for P points.
 template <class Real, Torsion torsion> class Solver {
     using L = Lanes<Real>;
-    static constexpr int Band = kBand<torsion>;
+    static constexpr bool turns = torsion == Torsion::kirchhoff;
+    static constexpr int Unknowns = turns ? 4 : 3, Band = kBand<torsion>;
+    using System = Window<Real, Unknowns, Band>;
 
   public:
-    Solver(Arena &arena, int P) : pivots_(arena.take<Pivots<Real, 3, Band>>(P)) {}
+    Solver(Arena &arena, int P) : pivots_(arena.take<Pivots<Real, Unknowns, Band>>(P)) {}
 
-    /// Solves for u; held points know theirs. `again`: the forces are known from a solve before.
-    void solve(const Equation<Real> &eq, bool again, Vec3<Real> *u) {
+    /// Solves for the velocities. `again`: the forces are known from a solve before.
+    void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
         const Block<Real> &b = eq.b;
         const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
         const L scale = splat(theta_dt * (theta_dt + Real(eq.settings.damping))) * b.per_mass;
-        Window<Real, 3, Band> window;
+        const int first = turns ? std::max(b.first - 1, 0) : b.first; // segment first - 1 turns
+        System window;
         Vec3<Real> before{};
         window.clear();
         for (int i = 0; i < b.P; ++i) {
             add_terms(eq, i, !again, scale, window);
             if (!again) {
                 const Vec3<Real> now = i + 1 < b.P ? edge_force(eq.edges, eq.from.T, i) : Vec3<Real>{};
-                eq.f[i] = b.per_mass * (now - before);
+                eq.f[i] = b.load[i] + b.per_mass * (now - before);
                 before = now;
             }
-            const L known[3] = {u[i].x, u[i].y, u[i].z};
-            if (i < b.first) {
-                window.pass(known);
+            const Values known = known_at(i, to);
+            if (i < first) {
+                window.pass(known.value);
                 continue;
             }
             add_point(eq, i, window);
-            if (b.held_inside) {
-                const L held = 1 - b.free[i];
-                window.impose({held, held, held}, known);
-            }
+            if constexpr (turns) add_turn(eq, i, window);
+            if (b.held_inside || i < b.first) window.impose(held_at(b, i).value, known.value);
             window.eliminate(pivots_[i]);
         }
         L known[Band]{};
-        for (int i = b.P - 1; i >= b.first; --i) {
+        for (int i = b.P - 1; i >= first; --i) {
             pivots_[i].substitute(known);
-            u[i] = {known[0], known[1], known[2]};
+            to.u[i] = {known[0], known[1], known[2]};
+            if constexpr (turns) to.spin[i] = known[3];
         }
     }
 
   private:
-    Pivots<Real, 3, Band> *pivots_;
+    struct Values {
+        L value[Unknowns];
+    };
+
+    Pivots<Real, Unknowns, Band> *pivots_;
+
+    RINGLET_INLINE static Values known_at(int i, const Velocities<Real> &at) {
+        if constexpr (turns) return {{at.u[i].x, at.u[i].y, at.u[i].z, at.spin[i]}};
+        else return {{at.u[i].x, at.u[i].y, at.u[i].z}};
+    }
+
+    RINGLET_INLINE static Values held_at(const Block<Real> &b, int i) {
+        const L held = 1 - b.free[i];
+        if constexpr (turns) return {{held, held, held, 1 - b.turns[i]}};
+        else return {{held, held, held}};
+    }
+
+    /// The row of s of segment i; the last point has no segment.
+    RINGLET_INLINE static void add_turn(const Equation<Real> &eq, int i, System &window) {
+        window.at(3, 3) += splat(i + 1 < eq.b.P ? Real(kSpin) : Real(1));
+        if (i + 1 == eq.b.P) return;
+        const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
+        window.right[3] -= theta_dt * eq.b.per_mass * eq.edges.il[i] * eq.edges.D_theta[i];
+    }
 
     /// The terms that begin at point i.
-    RINGLET_INLINE void add_terms(const Equation<Real> &eq, int i, bool force, L scale, Window<Real, 3, Band> &window) {
+    RINGLET_INLINE void add_terms(const Equation<Real> &eq, int i, bool force, L scale, System &window) {
         const Block<Real> &b = eq.b;
-        if (i + 2 < b.P) add_bend(b, eq.edges, i + 1, force, scale, window);
+        if constexpr (turns) {
+            if (i + 2 < b.P) add_joint(b, eq.from, eq.edges, i + 1, force, scale, window);
+        } else {
+            if (i + 2 < b.P) add_bend(b, eq.edges, i + 1, force, scale, window);
+        }
         if constexpr (torsion == Torsion::rotor)
             if (i + 3 < b.P) add_rotor(b, eq.edges, i + 1, force, scale, window);
         if constexpr (torsion == Torsion::frenet)
@@ -148,15 +192,17 @@ template <class Real> struct Solvers {
     Solver<Real, Torsion::none> none;
     Solver<Real, Torsion::rotor> rotor;
     Solver<Real, Torsion::frenet> frenet;
+    Solver<Real, Torsion::kirchhoff> kirchhoff;
 
     Solvers(Arena &arena, int P, Torsion torsion)
         : none(arena, torsion == Torsion::none ? P : 0), rotor(arena, torsion == Torsion::rotor ? P : 0),
-          frenet(arena, torsion == Torsion::frenet ? P : 0) {}
+          frenet(arena, torsion == Torsion::frenet ? P : 0), kirchhoff(arena, torsion == Torsion::kirchhoff ? P : 0) {}
 
-    void solve(const Equation<Real> &eq, bool again, Vec3<Real> *u) {
-        if (eq.settings.torsion == Torsion::rotor) rotor.solve(eq, again, u);
-        else if (eq.settings.torsion == Torsion::frenet) frenet.solve(eq, again, u);
-        else none.solve(eq, again, u);
+    void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
+        if (eq.settings.torsion == Torsion::kirchhoff) kirchhoff.solve(eq, again, to);
+        else if (eq.settings.torsion == Torsion::rotor) rotor.solve(eq, again, to);
+        else if (eq.settings.torsion == Torsion::frenet) frenet.solve(eq, again, to);
+        else none.solve(eq, again, to);
     }
 };
 

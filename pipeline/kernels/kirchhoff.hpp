@@ -51,13 +51,13 @@ template <class Real> struct HalfAngle {
 
     RINGLET_INLINE HalfAngle(Lanes<Real> A, Lanes<Real> S) {
         const Lanes<Real> zero = splat(Real(0)), one = splat(Real(1));
-        const Lanes<Real> scale = 1 / square_root<Real>(A * A + S * S + Real(1e-30));
+        const Lanes<Real> scale = inverse_root<Real>(A * A + S * S + Real(1e-30));
         A = A * scale, S = S * scale; // both are off only where 1 + p is clamped
         const Lanes<Real> sign = select<Real>(S < zero, -one, one);
         const Mask<Real> acute = A > zero;
-        const Lanes<Real> big = square_root<Real>(Real(0.5) * (1 + maximum<Real>(A, -A)));
-        const Lanes<Real> small = Real(0.5) * sign * S / big;
-        const Lanes<Real> least = 4 * arc_tangent<Real>(small / (1 + big)); // of the angle to 0 or to pi
+        const Lanes<Real> square = Real(0.5) * (1 + maximum<Real>(A, -A)), inverse = inverse_root<Real>(square);
+        const Lanes<Real> big = square * inverse, small = Real(0.5) * sign * S * inverse;
+        const Lanes<Real> least = 4 * arc_tangent<Real>(small * reciprocal<Real>(1 + big)); // of the angle to 0 or to pi
         angle = sign * select<Real>(acute, least, Real(3.14159265358979323846) - least);
         cosine = select<Real>(acute, big, small);
         sine = sign * select<Real>(acute, small, big);
@@ -77,7 +77,7 @@ template <class Real> struct Joint {
     RINGLET_INLINE Joint(Vec3<Real> t0, Vec3<Real> t1, Vec3<Real> m0, Vec3<Real> m1, L before) {
         constexpr Real turn = Real(6.28318530717958647692);
         const Vec3<Real> n0 = cross(t0, m0), n1 = cross(t1, m1);
-        const L inverse = 1 / maximum<Real>(1 + dot(t0, t1), splat(kFold<Real>));
+        const L inverse = reciprocal<Real>(maximum<Real>(1 + dot(t0, t1), splat(kFold<Real>)));
         const HalfAngle<Real> half(inverse * (dot(m0, m1) + dot(n0, n1)), inverse * (dot(n0, m1) - dot(m0, n1)));
         const L turns = nearest<Real>((before - half.angle) * (1 / turn));
         const Mask<Real> even = turns == 2 * nearest<Real>(Real(0.5) * turns);
@@ -96,45 +96,43 @@ template <class Real> struct Moments {
     Lanes<Real> M1, M2, Q;
 
     RINGLET_INLINE Moments(const Block<Real> &b, int i, const Joint<Real> &joint) {
-        const Lanes<Real> per_length = 1 / b.dl[i];
+        const Lanes<Real> per_length = b.inverse_dl[i];
         M1 = b.k_kappa * per_length * (joint.k1 - b.strain[i].x);
         M2 = b.k_kappa_2 * per_length * (joint.k2 - b.strain[i].y);
         Q = b.k_tau * per_length * (joint.twist - b.strain[i].z);
     }
 };
 
-/// The rod at some points and directors.
-template <class Real> struct Rod {
-    Joint<Real> *joint;  // entries 1 .. P-2
-    Lanes<Real> *by_theta; // gradient of the energy by theta_j
-    Lanes<Real> bending{}, twisting{}; // energies
-
-    Rod(Arena &arena, int P) : joint(arena.take<Joint<Real>>(P)), by_theta(arena.take<Lanes<Real>>(P)) {}
-};
-
-/// Adds the gradient by the tangents to the edges, D_j; sets joints, energies and the gradient by theta. With
-/// h = (M1 k1 + M2 k2) / 4 and the binormal kb:
+/// Adds the gradient of a joint's energy to the two edges beside it. With h = (M1 k1 + M2 k2) / 4 and the binormal kb:
 ///     dE/dt  = -(M1 + h k1) a1 - (M2 + h k2) a2 + (Q/2) kb,    dE/dtheta_{i-1} = (M1 k2 - M2 k1) / 2 - Q
 ///     dE/dt' = +(M1 + h k1) b1 + (M2 + h k2) b2 + (Q/2) kb,    dE/dtheta_i     = (M1 k2 - M2 k1) / 2 + Q
 template <class Real>
-void add_rod(const Block<Real> &b, const Vec3<Real> *m, const Lanes<Real> *twist, Edges<Real> &edges, Rod<Real> &rod) {
-    rod.bending = rod.twisting = Lanes<Real>{};
-    for (int j = 0; j < b.P; ++j) rod.by_theta[j] = Lanes<Real>{};
+RINGLET_INLINE void add_joint_gradient(const Moments<Real> &at, const Joint<Real> &q, Edges<Real> &edges, int i) {
+    const Lanes<Real> h = Real(0.25) * (at.M1 * q.k1 + at.M2 * q.k2), u1 = at.M1 + h * q.k1, u2 = at.M2 + h * q.k2;
+    const Vec3<Real> across = u1 * q.a1 + u2 * q.a2, twisted = (Real(0.5) * at.Q) * q.binormal();
+    const Lanes<Real> along = Real(0.5) * (u1 * q.k1 + u2 * q.k2), both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1);
+    edges.D[i - 1] = edges.D[i - 1] - across + twisted;
+    edges.D[i] = edges.D[i] + across - along * (edges.d[i - 1] + edges.d[i]) + twisted;
+    edges.D_theta[i - 1] += both - at.Q;
+    edges.D_theta[i] += both + at.Q;
+}
+
+template <class Real> struct RodEnergy {
+    Lanes<Real> bending{}, twisting{};
+};
+
+/// Adds the gradient of the whole rod with directors m; the twist of point i is the one nearest to twist[i].
+template <class Real>
+RodEnergy<Real> add_rod(const Block<Real> &b, const Vec3<Real> *m, const Lanes<Real> *twist, Edges<Real> &edges) {
+    RodEnergy<Real> energy;
     for (int i = 1; i < b.P - 1; ++i) {
-        const Vec3<Real> t0 = edges.d[i - 1], t1 = edges.d[i];
-        const Joint<Real> q(t0, t1, m[i - 1], m[i], twist[i]);
+        const Joint<Real> q(edges.d[i - 1], edges.d[i], m[i - 1], m[i], twist[i]);
         const Moments<Real> at(b, i, q);
-        rod.joint[i] = q;
-        rod.bending += Real(0.5) * (at.M1 * (q.k1 - b.strain[i].x) + at.M2 * (q.k2 - b.strain[i].y));
-        rod.twisting += Real(0.5) * at.Q * (q.twist - b.strain[i].z);
-        const Lanes<Real> h = Real(0.25) * (at.M1 * q.k1 + at.M2 * q.k2), u1 = at.M1 + h * q.k1, u2 = at.M2 + h * q.k2;
-        const Vec3<Real> across = u1 * q.a1 + u2 * q.a2, twisted = (Real(0.5) * at.Q) * q.binormal();
-        edges.D[i - 1] = edges.D[i - 1] - across + twisted;
-        edges.D[i] = edges.D[i] + across - (Real(0.5) * (u1 * q.k1 + u2 * q.k2)) * (t0 + t1) + twisted;
-        const Lanes<Real> both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1);
-        rod.by_theta[i - 1] += both - at.Q;
-        rod.by_theta[i] += both + at.Q;
+        energy.bending += Real(0.5) * (at.M1 * (q.k1 - b.strain[i].x) + at.M2 * (q.k2 - b.strain[i].y));
+        energy.twisting += Real(0.5) * at.Q * (q.twist - b.strain[i].z);
+        add_joint_gradient(at, q, edges, i);
     }
+    return energy;
 }
 
 /// Exact second derivative of a joint's bending energy by a common turn of its two directors, times dl.
@@ -155,8 +153,8 @@ template <class Real> struct RodRows {
 
     RINGLET_INLINE RodRows(const Block<Real> &b, const Edges<Real> &edges, int i, const Joint<Real> &q) {
         const L il0 = edges.il[i - 1], il1 = edges.il[i], B1 = b.k_kappa, B2 = b.k_kappa_2, one = splat(Real(1));
-        const Vec3<Real> tt = edges.d[i - 1] + edges.d[i], kb = Real(0.5) * q.binormal();
-        const L f1 = minimum<Real>(one, b.k_ratio), f2 = minimum<Real>(one, 1 / b.k_ratio); // k_ratio = B2 / B1
+        const Vec3<Real> tt = edges.d[i - 1] + edges.d[i], kb = splat(Real(0.5)) * q.binormal();
+        const L f1 = minimum<Real>(one, b.k_ratio), f2 = minimum<Real>(one, b.inverse_ratio);
         const L c1 = Real(0.5) * (q.k2 - f1 * (q.k2 - b.strain[i].y));
         const L c2 = Real(0.5) * (f2 * (q.k1 - b.strain[i].x) - q.k1);
         const Vec3<Real> qa = q.k1 * q.a1 + q.k2 * q.a2;
@@ -181,27 +179,26 @@ template <class Real> struct RodRows {
     }
 };
 
-/// Adds scale times the stiffness of joint i to rows 4 (i-1) and on of a banded matrix.
-template <class Real, class Matrix>
-RINGLET_INLINE void add_joint_stiffness(const Block<Real> &b, const Edges<Real> &edges, int i, const Joint<Real> &q,
-                                        Lanes<Real> scale, Matrix &A) {
+/// What joint i adds to the system of a step: its gradient where `force` is set, and scale times its stiffness to a
+/// window of a banded matrix that begins at point i - 1.
+template <class Real, class Window>
+RINGLET_INLINE void add_joint(const Block<Real> &b, const Motion<Real> &from, Edges<Real> &edges, int i, bool force,
+                              Lanes<Real> scale, Window &window) {
+    const Joint<Real> q(edges.d[i - 1], edges.d[i], from.m[i - 1], from.m[i], from.twist[i]);
+    if (force) add_joint_gradient(Moments<Real>(b, i, q), q, edges, i);
     const RodRows<Real> rows(b, edges, i, q);
-    const Lanes<Real> per_length = scale / b.dl[i];
-    const Lanes<Real> weight[3] = {per_length * b.k_kappa, per_length * b.k_kappa_2, per_length * b.k_tau};
+    const Lanes<Real>(&g)[3][11] = rows.row, per_length = scale * b.inverse_dl[i];
+    const Lanes<Real> w[3] = {per_length * b.k_kappa, per_length * b.k_kappa_2, per_length * b.k_tau};
 #pragma GCC unroll 11
     for (int r = 0; r < 11; ++r) {
-        Lanes<Real> *to = A.row(4 * (i - 1) + r);
-        const Lanes<Real> w0 = weight[0] * rows.row[0][r], w1 = weight[1] * rows.row[1][r],
-                          w2 = weight[2] * rows.row[2][r];
+        const Lanes<Real> w0 = w[0] * g[0][r], w1 = w[1] * g[1][r], w2 = w[2] * g[2][r];
 #pragma GCC unroll 11
-        for (int c = r; c < 11; ++c)
-            to[c - r] += w0 * rows.row[0][c] + w1 * rows.row[1][c] + w2 * rows.row[2][c];
+        for (int c = r; c < 11; ++c) window.at(r, c) += w0 * g[0][c] + w1 * g[1][c] + w2 * g[2][c];
     }
     const Lanes<Real> il0 = edges.il[i - 1], il1 = edges.il[i], turning = per_length * rows.turning;
-    Lanes<Real> *before = A.row(4 * i - 1), *after = A.row(4 * i + 3);
-    before[0] += turning * il0 * il0;
-    before[4] += turning * il0 * il1;
-    after[0] += turning * il1 * il1;
+    window.at(3, 3) += turning * il0 * il0;
+    window.at(3, 7) += turning * il0 * il1;
+    window.at(7, 7) += turning * il1 * il1;
 }
 
 } // namespace ringlet

@@ -5,7 +5,7 @@
 
 namespace ringlet {
 
-enum class Torsion { none, frenet, rotor };
+enum class Torsion { none, frenet, rotor, kirchhoff };
 enum class Relaxation { newton, sweep };
 
 struct StepSettings {

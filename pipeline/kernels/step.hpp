@@ -7,6 +7,7 @@
 
 #include "implicit.hpp"
 #include "relaxation.hpp"
+#include "twist.hpp"
 
 #include <memory>
 #include <vector>
@@ -36,15 +37,15 @@ template <class Real> class Stepper {
 
     Stepper(Arena &arena, int P, const StepSettings &settings, const DistanceField *field)
         : block(arena, P), now(arena, P), contacts(arena, P), settings_(settings), field_(field), next_(arena, P),
-          edges_(arena, P), lengths_(arena, P), solvers_(arena, P, settings.torsion),
+          edges_(arena, P), lengths_(arena, P), directors_(arena, P), solvers_(arena, P, settings.torsion),
           f_(arena.take<Vec3<Real>>(P)), u_(arena.take<Vec3<Real>>(P)), star_(arena.take<Vec3<Real>>(P)) {
         for (int depth = 0; depth < 2 * kHalvings; ++depth) halves_.emplace_back(arena, P);
     }
 
     /// Bytes that a Stepper takes from its arena.
     static size_t bytes(int P) {
-        constexpr size_t pivots = 3 * 15, motions = 2 + 2 * kHalvings, points = 80;
-        return sizeof(L) * ((pivots + 8 * motions + points) * P + 4096);
+        constexpr size_t pivots = 3 * 15, motions = 2 + 2 * kHalvings, points = 112;
+        return sizeof(L) * ((pivots + 12 * motions + points) * P + 4096);
     }
 
     void step(const Interval<Real> &interval, M wanted) {
@@ -60,12 +61,15 @@ template <class Real> class Stepper {
     }
 
   private:
+    bool has_directors() const { return settings_.torsion == Torsion::kirchhoff; }
+
     const StepSettings &settings_;
     const DistanceField *field_;
     Motion<Real> next_;
     std::vector<Motion<Real>> halves_;
     Edges<Real> edges_;
     Lengths<Real> lengths_;
+    Directors<Real> directors_;
     Solvers<Real> solvers_;
     Vec3<Real> *f_, *u_, *star_; // forces, velocities of travel, points before the rounds
     M hopeless_{};               // lanes that failed in the shortest step too: not halved again in this one
@@ -92,6 +96,8 @@ template <class Real> class Stepper {
             to.v[i] = select(failed, end.v[i], to.v[i]);
             to.T[i] = select<Real>(failed, end.T[i], to.T[i]);
             to.touch[i] = select<Real>(failed, end.touch[i], to.touch[i]);
+            to.m[i] = select(failed, end.m[i], to.m[i]);
+            to.twist[i] = select<Real>(failed, end.twist[i], to.twist[i]);
         }
     }
 
@@ -106,6 +112,7 @@ template <class Real> class Stepper {
             to.v[i] = select(moved, per_second * (to.x[i] - from.x[i]), to.v[i]);
         }
         for (int j = 0; j < block.P - 1; ++j) to.T[j] = select<Real>(lanes, from.T[j], to.T[j]);
+        if (has_directors()) directors_.carry(block, from, to, lanes);
         const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
         tally.strain = maximum<Real>(tally.strain, select<Real>(lanes, lengths_.strain(block, to.x), L{}));
         tally.depth = maximum<Real>(tally.depth, select<Real>(lanes, contacts.depth(block, head, to.x), L{}));
@@ -124,6 +131,7 @@ template <class Real> class Stepper {
         const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
         move_held(interval, from, to);
         edges_.set(from.x, block.P);
+        hold_directors(interval, from, to);
         contacts.find_rows(block, head, from, dt);
         if (settings_.is_explicit) explicit_velocities(interval, from, to);
         else implicit_velocities(interval, from, to);
@@ -133,6 +141,7 @@ template <class Real> class Stepper {
         }
         M failed = relax(head, from, to, theta() * dt * dt, wanted);
         finish(head, from, to, dt);
+        if (has_directors()) directors_.follow(block, edges_, dt, from, to);
         return failed;
     }
 
@@ -149,12 +158,23 @@ template <class Real> class Stepper {
         }
     }
 
+    /// Held directors go with the head or the hand; the torsion models without directors leave them as they are.
+    void hold_directors(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
+        if (has_directors()) {
+            const Rigid<Real> ends[2] = {interval.poses.head[1], interval.poses.hand[1]};
+            directors_.hold(block, edges_, ends, Real(interval.dt), from, to);
+            return;
+        }
+        std::copy_n(from.m, block.P, to.m);
+        std::copy_n(from.twist, block.P, to.twist);
+    }
+
     /// Banded solve; rows that would pull are dropped and the system is solved again.
     void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
         const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, f_};
         for (int again = 0;; ++again) {
             ++tally.solves;
-            solvers_.solve(equation, again > 0, u_);
+            solvers_.solve(equation, again > 0, {u_, directors_.spin});
             if (!contacts.any_row) break;
             if (!contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) break;
         }
@@ -164,7 +184,7 @@ template <class Real> class Stepper {
     /// Symplectic Euler: no matrix, no tension, no rows; lengths and contacts are left to the rounds.
     void explicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
         const L dt = splat(Real(interval.dt));
-        internal_forces(block, settings_, from.T, edges_, f_);
+        steady_forces(block, settings_, from, edges_, f_);
         for (int i = block.first; i < block.P; ++i) {
             Drag<Real> drag(block, from, i, settings_, interval.wind);
             Vec3<Real> v = from.v[i];

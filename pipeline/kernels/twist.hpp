@@ -22,7 +22,7 @@ inline constexpr double kLeastTwisting = 1e-5; // part of the stiffness that hol
 /// m turned as the tangent t turns into u on the shortest way.
 template <class Real> RINGLET_INLINE Vec3<Real> transport(Vec3<Real> m, Vec3<Real> t, Vec3<Real> u) {
     Lanes<Real> opened = maximum<Real>(1 + dot(t, u), splat(kFold<Real>));
-    return m - (dot(m, u) / opened) * (t + u);
+    return m - (dot(m, u) * reciprocal<Real>(opened)) * (t + u);
 }
 
 /// A director for a tangent: square to the first of two fixed axes that is not too near. They are skew to x, y and z,
@@ -33,7 +33,7 @@ template <class Real> RINGLET_INLINE Vec3<Real> some_director(Vec3<Real> t) {
     const Lanes<Real> along = dot(first, t);
     const Vec3<Real> axis = select((along < Real(0.9)) & (along > Real(-0.9)), first, second);
     const Vec3<Real> m = axis - dot(axis, t) * t;
-    return (1 / square_root<Real>(dot(m, m))) * m;
+    return inverse_root<Real>(dot(m, m)) * m;
 }
 
 /// The unit director nearest to m that is square to the unit tangent t; m is nearly that already.
@@ -43,13 +43,13 @@ template <class Real> RINGLET_INLINE Vec3<Real> squared(Vec3<Real> m, Vec3<Real>
     Vec3<Real> unit = (Real(1.5) - Real(0.5) * mm) * m;
     const Mask<Real> far = ~(off < Real(1e-4));
     if (!any<Real>(far)) return unit;
-    unit = select(far, (1 / square_root<Real>(maximum<Real>(mm, splat(Real(1e-4))))) * m, unit);
+    unit = select(far, inverse_root<Real>(maximum<Real>(mm, splat(Real(1e-4)))) * m, unit);
     return select(~(mm > Real(1e-4)), some_director(t), unit);
 }
 
 /// m turned about t by the angle 2 arctan(u).
 template <class Real> RINGLET_INLINE Vec3<Real> turned(Vec3<Real> m, Vec3<Real> t, Lanes<Real> u) {
-    const Lanes<Real> uu = u * u, scale = 1 / (1 + uu);
+    const Lanes<Real> uu = u * u, scale = reciprocal<Real>(1 + uu);
     return ((1 - uu) * scale) * m + (2 * u * scale) * cross(t, m);
 }
 
@@ -63,6 +63,20 @@ template <class Real> RINGLET_INLINE Lanes<Real> half_turn(Lanes<Real> angle) {
 template <class Real> void untwisted_directors(const Edges<Real> &edges, int P, Vec3<Real> *m) {
     m[0] = some_director(edges.d[0]);
     for (int j = 1; j < P - 1; ++j) m[j] = squared(transport(m[j - 1], edges.d[j - 1], edges.d[j]), edges.d[j]);
+}
+
+/// The same for S strands of P points (S, P, 3), in float64: directors (S, P-1, 3).
+template <class Real> void untwisted_directors(const Real *points, int S, int P, Real *directors) {
+    Arena arena(sizeof(Lanes<double>) * 16 * (P + 8));
+    Edges<double> edges(arena, P);
+    auto *x = arena.take<Vec3<double>>(P), *m = arena.take<Vec3<double>>(P);
+    for (int k = 0; k < block_count<double>(S); ++k) {
+        const BlockIndex<double> index(k, S);
+        gather(x, points, P, index.strand);
+        edges.set(x, P);
+        untwisted_directors(edges, P, m);
+        scatter(m, directors, P - 1, index);
+    }
 }
 
 /// Takes the directors of a block through steps. Memory of one step.
@@ -83,7 +97,7 @@ template <class Real> class Directors {
         for (int j = 0; j < b.P - 1; ++j) {
             spin[j] = L{};
             if (!any<Real>(b.turns[j] < 1)) continue;
-            const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = (1 / square_root<Real>(dot(edge, edge))) * edge;
+            const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = inverse_root<Real>(dot(edge, edge)) * edge;
             const Vec3<Real> by_head = head_and_hand[0].turn(b.director[j]);
             const Vec3<Real> by_hand = head_and_hand[1].turn(b.director[j]);
             const Vec3<Real> m = squared(select(b.hand[j] > 0, by_hand, by_head), t);
@@ -97,7 +111,7 @@ template <class Real> class Directors {
     /// Free directors at the end of the step, and the twist of all joints.
     void follow(const Block<Real> &b, const Edges<Real> &edges, Real dt, const Motion<Real> &from, Motion<Real> &to) {
         for (int j = 0; j < b.P - 1; ++j) {
-            const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = (1 / square_root<Real>(dot(edge, edge))) * edge;
+            const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = inverse_root<Real>(dot(edge, edge)) * edge;
             const Vec3<Real> m = squared(transport(from.m[j], edges.d[j], t), t);
             to.m[j] = select(b.turns[j] > 0, turned(m, t, half_turn<Real>(dt * edges.il[j] * spin[j])), to.m[j]);
             t_[j] = t;
@@ -109,7 +123,7 @@ template <class Real> class Directors {
     void carry(const Block<Real> &b, const Motion<Real> &from, Motion<Real> &to, Mask<Real> lanes) {
         for (int j = 0; j < b.P - 1; ++j) {
             const Vec3<Real> edge = to.x[j + 1] - to.x[j];
-            t_[j] = (1 / square_root<Real>(dot(edge, edge))) * edge;
+            t_[j] = inverse_root<Real>(dot(edge, edge)) * edge;
             to.m[j] = select(lanes & (b.turns[j] > 0), from.m[j], to.m[j]);
             if (j == 0) continue;
             const Joint<Real> q(t_[j - 1], t_[j], to.m[j - 1], to.m[j], from.twist[j]);
@@ -131,7 +145,7 @@ template <class Real> class Directors {
                 const int i = j + 1;
                 const Joint<Real> q(t_[j], t_[i], to.m[j], to.m[i], from.twist[i]);
                 const Moments<Real> at(b, i, q);
-                const L both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1), per_length = 1 / b.dl[i];
+                const L both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1), per_length = b.inverse_dl[i];
                 const L g = Real(0.25) * maximum<Real>(turning_stiffness(b, i, q), none);
                 next_diagonal = per_length * (b.k_tau + g + Real(kLeastTwisting) * (b.k_kappa + b.k_tau));
                 next_coupling = per_length * (g - b.k_tau) * b.turns[j] * b.turns[i];
@@ -144,13 +158,13 @@ template <class Real> class Directors {
             const L factor = j > 0 ? coupling * inverse_[j - 1] : none;
             L pivot = select<Real>(turns, diagonal, one), value = select<Real>(turns, force, none);
             if (j > 0) pivot -= factor * coupling, value -= factor * right_[j - 1];
-            inverse_[j] = 1 / pivot, right_[j] = value, upper_[j] = next_coupling;
+            inverse_[j] = reciprocal<Real>(pivot), right_[j] = value, upper_[j] = next_coupling;
             diagonal = next_diagonal, force = next_force, coupling = next_coupling;
         }
         L after = none, turn_after = none;
         for (int j = b.P - 2; j >= 0; --j) {
             after = (right_[j] - upper_[j] * after) * inverse_[j];
-            const L half = half_turn<Real>(after), turn = 2 * arc_tangent(half);
+            const L half = half_turn<Real>(after), turn = 2 * arc_tangent<Real>(half);
             to.m[j] = turned(to.m[j], t_[j], half);
             if (j + 1 < b.P - 1) to.twist[j + 1] += turn_after - turn;
             turn_after = turn;

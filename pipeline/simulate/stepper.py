@@ -18,6 +18,7 @@ from pipeline.simulate.wind import wind
 Arrays = dict[str, NDArray[Any]]
 
 _ENERGIES = ("bending", "torsion", "kinetic", "gravity")
+_STATE = ("points", "velocity", "tension", "contact", "directors", "twist")
 _TORN = 0.5  # strain of a segment that no relaxation brings back
 
 
@@ -66,7 +67,7 @@ class Simulation:
         self.hand = tip_motion(simulate.tips, _middle_of_tips(guides), simulate.settle / 2)
         self.wind = wind(simulate.air, seed)
         self.step = 0
-        self.state = kernels.at_rest(self._first_points(guides.points))
+        self.state = self._first_state(guides.points)
         self._diagnostics = _summary(None)
 
     def settle(self, report: Callable[[int], None] = lambda _: None) -> None:
@@ -97,19 +98,12 @@ class Simulation:
 
     def save(self) -> Arrays:
         """All that the future depends on."""
-        state = self.state
-        return {
-            "points": state.points,
-            "velocity": state.velocity,
-            "tension": state.tension,
-            "contact": state.contact,
-            "step": np.array([self.step], np.int64),
-        }
+        arrays = {name: getattr(self.state, name) for name in _STATE}
+        return {**arrays, "step": np.array([self.step], np.int64)}
 
     def restore(self, saved: Arrays) -> None:
         """Carry on from what `save` returned."""
-        arrays = (np.ascontiguousarray(saved[name]) for name in ("points", "velocity", "tension", "contact"))
-        self.state = kernels.State(*arrays)
+        self.state = kernels.State(**{name: np.ascontiguousarray(saved[name]) for name in _STATE})
         self.step = int(saved["step"][0])
 
     def _advance(self, count: int, settings: kernels.StepSettings) -> None:
@@ -133,10 +127,13 @@ class Simulation:
     def _time(self, steps: float) -> float:
         return (self.step + steps) * self.settings.dt
 
-    def _first_points(self, points: NDArray[np.float32]) -> NDArray[np.float32] | NDArray[np.float64]:
-        pose = self.head(0.0)
+    def _first_state(self, points: NDArray[np.float32]) -> kernels.State:
+        pose, precision = self.head(0.0), np.dtype(self.simulate.precision)
         moved = points.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
-        return np.ascontiguousarray(moved, np.dtype(self.simulate.precision))
+        directors = self.rest.directors @ pose[:3, :3].T
+        return kernels.at_rest(
+            np.ascontiguousarray(moved, precision), np.ascontiguousarray(directors, precision)
+        )
 
 
 def _summary(report: kernels.Report | None) -> dict[str, float]:

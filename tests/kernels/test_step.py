@@ -24,7 +24,7 @@ from strand_scenes import (
 from pipeline import kernels
 
 Points = NDArray[np.float64]
-ARRAYS = ("points", "velocity", "tension", "contact")
+ARRAYS = ("points", "velocity", "tension", "contact", "directors", "twist")
 
 
 @pytest.fixture(autouse=True)
@@ -107,7 +107,7 @@ def test_float32_agrees_with_float64() -> None:
     assert difference < 1e-4
 
 
-@pytest.mark.parametrize("torsion", ["rotor", "frenet", "none"])
+@pytest.mark.parametrize("torsion", ["kirchhoff", "rotor", "frenet", "none"])
 def test_a_free_strand_keeps_its_momentum_and_falls_with_gravity(torsion: str, curl: Points) -> None:
     rest = shape(curl[None], held=np.zeros((1, 32), np.uint8))
     state = kernels.at_rest(curl[None])
@@ -121,7 +121,7 @@ def test_a_free_strand_keeps_its_momentum_and_falls_with_gravity(torsion: str, c
     assert error <= 1e-9
 
 
-@pytest.mark.parametrize("torsion", ["rotor", "frenet"])
+@pytest.mark.parametrize("torsion", ["kirchhoff", "rotor", "frenet"])
 def test_a_helix_in_its_rest_shape_stays(torsion: str, curl: Points) -> None:
     state = kernels.at_rest(curl[None])
     kernels.advance(state, shape(curl[None]), None, drive(1200), settings(**FREE, torsion=torsion))
@@ -130,7 +130,7 @@ def test_a_helix_in_its_rest_shape_stays(torsion: str, curl: Points) -> None:
     assert drift <= 1e-6
 
 
-@pytest.mark.parametrize("torsion", ["rotor", "frenet"])
+@pytest.mark.parametrize("torsion", ["kirchhoff", "rotor", "frenet"])
 def test_an_equilibrium_is_one_for_every_dt(torsion: str, curl: Points) -> None:
     """Because the tension is carried. (From rest, "frenet" may snap into another coil at another dt.)"""
     rest = shape(curl[None], roots(1, 32, 3))
@@ -298,7 +298,7 @@ def test_bad_numbers_are_reported_and_stay_in_their_strand(curl: Points) -> None
 @pytest.mark.parametrize("points", [8, 256])
 def test_shortest_and_longest_strands_step(points: int) -> None:
     strand = helix(0.008, 0.02, 0.25, points)[None]
-    for torsion in ("rotor", "frenet"):
+    for torsion in ("kirchhoff", "rotor", "frenet"):
         state = kernels.at_rest(strand.astype(np.float32))
         report = kernels.advance(state, shape(strand), None, drive(24), settings(torsion=torsion))
         assert report.bad_strand == -1
@@ -320,7 +320,14 @@ def test_states_that_do_not_fit_are_refused(curl: Points) -> None:
     with pytest.raises(ValueError, match="different numbers"):
         kernels.advance(state, shape(curl[None, :16].copy()), None, drive(1), settings())
     with pytest.raises(ValueError, match="one precision"):
-        kernels.State(state.points, state.velocity.astype(np.float32), state.tension, state.contact)
+        kernels.State(
+            state.points,
+            state.velocity.astype(np.float32),
+            state.tension,
+            state.contact,
+            state.directors,
+            state.twist,
+        )
     with pytest.raises(ValueError, match="torsion"):
         settings(torsion="helix")
     with pytest.raises(ValueError, match="wind"):

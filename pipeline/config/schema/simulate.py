@@ -91,8 +91,8 @@ class Simulate(Section):
     """Precision of the guides: "float32" is twice as fast, but fails on short strands of many points (spacing below 1 mm)."""
     theta: Annotated[float, Field(ge=0.5, le=1)] = 0.6
     """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond."""
-    torsion: Literal["rotor", "frenet", "none"] = "rotor"
-    """Torsion model: "rotor" (4-point, one minimum), "frenet" (the lecture's, regularised) or "none"."""
+    torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "rotor"
+    """Torsion model: "kirchhoff" (material frames), "rotor" (4-point), "frenet" (the lecture's, regularised) or "none"."""
     relaxation: Literal["newton", "sweep"] = "newton"
     """Length relaxation: "newton" (tridiagonal, 2 iterations) or the lecture's "sweep" (hundreds)."""
     tolerance: Annotated[float, Field(gt=0, le=0.1)] = 1e-4
