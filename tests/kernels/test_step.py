@@ -24,6 +24,7 @@ from strand_scenes import (
 from pipeline import kernels
 
 Points = NDArray[np.float64]
+every_model = pytest.mark.parametrize("torsion", ["kirchhoff", "rotor"])
 ARRAYS = ("points", "velocity", "tension", "contact", "directors", "twist")
 
 
@@ -49,33 +50,38 @@ def curly_head(count: int, precision: type = np.float32) -> tuple[kernels.RestSh
     return shape(points), kernels.at_rest(points.astype(precision))
 
 
+@every_model
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
-def test_result_does_not_depend_on_the_number_of_threads(precision: type) -> None:
+def test_result_does_not_depend_on_the_number_of_threads(precision: type, torsion: str) -> None:
     results = []
     for threads in (1, 2):
         kernels.set_threads(threads)
         rest, state = curly_head(70, precision)
-        kernels.advance(state, rest, sphere(), drive(60, shake(1 / 240)), settings())
+        kernels.advance(state, rest, sphere(), drive(60, shake(1 / 240)), settings(torsion=torsion))
         results.append(state)
     assert same(*results)
 
 
-@pytest.mark.parametrize("relaxation", ["newton", "sweep"])
-def test_a_strand_moves_the_same_alone_and_among_others(relaxation: str) -> None:
+@pytest.mark.parametrize(
+    ("relaxation", "torsion"), [("newton", "rotor"), ("sweep", "rotor"), ("newton", "kirchhoff")]
+)
+def test_a_strand_moves_the_same_alone_and_among_others(relaxation: str, torsion: str) -> None:
     """Long undamped steps, so that lanes converge in different rounds (for halving, see the strand given up alone)."""
-    step = settings(dt=1 / 60, relaxation=relaxation, **STILL, damping=0.0)
+    step = settings(dt=1 / 60, relaxation=relaxation, torsion=torsion, **STILL, damping=0.0)
     rest, state = curly_head(19)
     alone_points = np.ascontiguousarray(rest.points[7:8])
     alone_rest, alone = shape(alone_points), kernels.at_rest(alone_points.astype(np.float32))
     report = kernels.advance(state, rest, sphere(), drive(60, shake(1 / 60)), step)
     kernels.advance(alone, alone_rest, sphere(), drive(60, shake(1 / 60)), step)
-    print(f"{relaxation}: {report.halvings} halvings, up to {report.rounds_max} rounds")
+    print(f"{relaxation}, {torsion}: {report.halvings} halvings, up to {report.rounds_max} rounds")
     assert report.rounds_max > 2
-    assert alone.points.tobytes() == state.points[7:8].tobytes()
+    for name in ("points", "directors", "twist"):
+        assert getattr(alone, name).tobytes() == getattr(state, name)[7:8].tobytes()
 
 
-def test_saved_arrays_resume_bit_by_bit() -> None:
-    step = settings()
+@every_model
+def test_saved_arrays_resume_bit_by_bit(torsion: str) -> None:
+    step = settings(torsion=torsion)
     rest, through = curly_head(16)
     kernels.advance(through, rest, sphere(), drive(20, shake(1 / 240)), step)
     resumed = copy(through)
@@ -84,8 +90,9 @@ def test_saved_arrays_resume_bit_by_bit() -> None:
     assert same(through, resumed)
 
 
-def test_one_long_call_equals_many_short_ones() -> None:
-    step = settings()
+@every_model
+def test_one_long_call_equals_many_short_ones(torsion: str) -> None:
+    step = settings(torsion=torsion)
     rest, whole = curly_head(16)
     parts = copy(whole)
     kernels.advance(whole, rest, sphere(), drive(40, shake(1 / 240)), step)
@@ -94,15 +101,16 @@ def test_one_long_call_equals_many_short_ones() -> None:
     assert same(whole, parts)
 
 
-def test_float32_agrees_with_float64() -> None:
+@every_model
+def test_float32_agrees_with_float64(torsion: str) -> None:
     ends = {}
     for precision in (np.float32, np.float64):
         rest, state = curly_head(16, precision)
-        kernels.advance(state, rest, sphere(), drive(120, shake(1 / 240)), settings())
+        kernels.advance(state, rest, sphere(), drive(120, shake(1 / 240)), settings(torsion=torsion))
         ends[precision] = state.points.astype(float)
     difference = np.median(np.abs(ends[np.float32] - ends[np.float64]).max((1, 2)))
     print(
-        f"float32 against float64 after half a second of shake: median of the worst point {difference * 1e3:.1e} mm"
+        f"{torsion}: float32 against float64 after half a second of shake: median of the worst point {difference * 1e3:.1e} mm"
     )
     assert difference < 1e-4
 
@@ -185,32 +193,38 @@ def test_points_held_by_the_hand_follow_it_and_the_others_follow_the_head(curl: 
     assert report.strain <= 1.001e-4
 
 
+@every_model
 @pytest.mark.parametrize("count", [0, 1, 2, 3])
-def test_lanes_with_different_held_points_do_not_disturb_each_other(count: int, curl: Points) -> None:
+def test_lanes_with_different_held_points_do_not_disturb_each_other(
+    count: int, torsion: str, curl: Points
+) -> None:
     """A strand held at `count` points moves the same beside strands that are held elsewhere."""
     points = np.repeat(curl[None], 5, axis=0)
     held = np.concatenate([roots(1, 32, n) for n in (count, 2, 0, 4, 1)])
     held[3, -1] = 1
     state = kernels.at_rest(points)
-    kernels.advance(state, shape(points, held), None, drive(48), settings())
+    kernels.advance(state, shape(points, held), None, drive(48), settings(torsion=torsion))
     alone = kernels.at_rest(points[:1])
-    kernels.advance(alone, shape(points[:1], held[:1]), None, drive(48), settings())
+    kernels.advance(alone, shape(points[:1], held[:1]), None, drive(48), settings(torsion=torsion))
     difference = np.abs(alone.points - state.points[:1]).max()
-    print(f"{count} held points: difference {difference:.1e} m")
+    print(f"{torsion}, {count} held points: difference {difference:.1e} m")
     assert difference <= 1e-12
 
 
-def test_internal_damping_does_not_drag_a_strand_that_turns_rigidly(curl: Points) -> None:
+@every_model
+def test_internal_damping_does_not_drag_a_strand_that_turns_rigidly(torsion: str, curl: Points) -> None:
     """beta K is zero for a rigid rotation: with it a turning strand loses no speed of turning."""
     speeds = []
     for damping in (0.0, 3e-3):
         rest = shape(curl[None] - curl.mean(0), held=np.zeros((1, 32), np.uint8))
         state = kernels.at_rest(rest.points)
         state.velocity[...] = np.cross([0, 0, 0.5], rest.points)
-        kernels.advance(state, rest, None, drive(120), settings(**{**FREE, "damping": damping}))
+        kernels.advance(
+            state, rest, None, drive(120), settings(**{**FREE, "damping": damping}, torsion=torsion)
+        )
         L = np.cross(state.points, rest.mass[..., None] * state.velocity).sum((0, 1))
         speeds.append(L[2])
-    print(f"angular momentum kept with damping over without: {speeds[1] / speeds[0]:.6f}")
+    print(f"{torsion}: angular momentum kept with damping over without: {speeds[1] / speeds[0]:.6f}")
     assert speeds[1] == pytest.approx(speeds[0], rel=0.01)
 
 
@@ -235,15 +249,16 @@ def test_terminal_fall_of_an_isolated_fibre(straight: Points) -> None:
     assert -state.velocity[0, :, 1] == pytest.approx(expected, rel=0.005)
 
 
-def test_energy_of_an_undamped_strand_never_grows_at_theta_one(curl: Points) -> None:
+@every_model
+def test_energy_of_an_undamped_strand_never_grows_at_theta_one(torsion: str, curl: Points) -> None:
     rest, state = shape(curl[None]), kernels.at_rest(curl[None])
-    step = settings(**STILL, damping=0.0, theta=1.0)
+    step = settings(**STILL, damping=0.0, theta=1.0, torsion=torsion)
     totals = [kernels.energies(state, rest, step).sum()]
     for _ in range(48):
         kernels.advance(state, rest, None, drive(5), step)
         totals.append(kernels.energies(state, rest, step).sum())
     growth = np.diff(totals).max() / (max(totals) - min(totals))
-    print(f"largest growth of the energy in 5 steps: {growth:.1e} of its range")
+    print(f"{torsion}: largest growth of the energy in 5 steps: {growth:.1e} of its range")
     assert growth <= 1e-3
 
 
@@ -255,6 +270,10 @@ def test_energies_are_those_of_the_formulas(curl: Points, kinked: Points) -> Non
     assert torsion == pytest.approx(kernels.torsion_rotor(kinked[None], rest)[0][0], rel=1e-12)
     assert kinetic == pytest.approx(0.5 * rest.mass.sum() * 0.75, rel=1e-12)
     assert gravity == pytest.approx(9.81 * (rest.mass[0] * kinked[:, 1]).sum(), rel=1e-12)
+    bending, twisting, _, _ = kernels.energies(state, rest, settings(torsion="kirchhoff"))[0]
+    untwisted = kernels.kirchhoff(kinked[None], state.directors, rest)[0][0]
+    assert twisting == pytest.approx(0, abs=1e-12 * bending)
+    assert bending == pytest.approx(untwisted, rel=1e-12)
 
 
 def test_implicit_step_converges_to_the_explicit_one(straight: Points) -> None:
@@ -272,25 +291,28 @@ def test_implicit_step_converges_to_the_explicit_one(straight: Points) -> None:
     assert errors[2] < errors[1] < errors[0] < 2e-3
 
 
-def test_rotated_scene_gives_the_rotated_motion(curl: Points) -> None:
+@every_model
+def test_rotated_scene_gives_the_rotated_motion(torsion: str, curl: Points) -> None:
     turn = rotation((1, 2, 3), 0.8)
     ends = []
     for R in (np.eye(3), turn):
         points = np.ascontiguousarray(curl[None] @ R.T)
-        state = kernels.at_rest(points)
-        kernels.advance(state, shape(points), None, drive(60), settings(gravity=tuple(R @ [0, -9.81, 0])))
+        rest, state = shape(points), kernels.at_rest(points)
+        step = settings(gravity=tuple(R @ [0, -9.81, 0]), torsion=torsion)
+        kernels.advance(state, rest, None, drive(60), step)
         ends.append(state.points[0])
     error = np.abs(ends[1] - ends[0] @ turn.T).max()
-    print(f"rotated scene: difference {error:.1e} m after 60 steps")
+    print(f"{torsion}: rotated scene: difference {error:.1e} m after 60 steps")
     assert error <= 1e-9
 
 
-def test_bad_numbers_are_reported_and_stay_in_their_strand(curl: Points) -> None:
+@every_model
+def test_bad_numbers_are_reported_and_stay_in_their_strand(torsion: str) -> None:
     rest, state = curly_head(12, np.float64)
     clean = copy(state)
     state.points[9, 12, 1] = np.nan
-    report = kernels.advance(state, rest, sphere(), drive(24), settings())
-    kernels.advance(clean, rest, sphere(), drive(24), settings())
+    report = kernels.advance(state, rest, sphere(), drive(24), settings(torsion=torsion))
+    kernels.advance(clean, rest, sphere(), drive(24), settings(torsion=torsion))
     assert report.bad_strand == 9
     assert (state.points[:9] == clean.points[:9]).all()
 
