@@ -23,6 +23,9 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
     """
     guides, strand = read_guides(experiment)
     simulation = Simulation(config.simulate, config.seed, guides)
+    jumps = [1 + round(start * config.simulate.fps) for start in simulation.head.starts[1:]]
+    if jumps:
+        say("simulate", f"the head jumps at frame {', '.join(map(str, jumps))}; hair is carried along")
     segments = cache.Segments(experiment.guides, key)
     kept = experiment.folder / "diverged.h5"
     kept.unlink(missing_ok=True)

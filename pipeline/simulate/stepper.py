@@ -13,6 +13,7 @@ from pipeline.config.schema import Simulate
 from pipeline.errors import InputError
 from pipeline.simulate.motion import head_motion, tip_motion
 from pipeline.simulate.rest import rest_shape, settling, step_settings
+from pipeline.simulate.screws import Pose, inverse, place
 from pipeline.simulate.wind import wind
 
 Arrays = dict[str, NDArray[Any]]
@@ -62,7 +63,7 @@ class Simulation:
         self.rest = rest_shape(simulate.hair, guides.points, guides.pins, guides.offset)
         self.field = guides.field
         self.settings = step_settings(simulate)
-        self.head = head_motion(simulate.motion)
+        self.head = head_motion(simulate.motion, simulate.fps)
         self.hand = tip_motion(simulate.tips, _middle_of_tips(guides), simulate.settle / 2)
         self.wind = wind(simulate.air, seed)
         self.step = 0
@@ -113,14 +114,23 @@ class Simulation:
         self.step = int(saved["step"][0])
 
     def _advance(self, count: int, settings: kernels.StepSettings) -> None:
-        heads = [self.head(self._time(i)) for i in range(count + 1)]
-        hands = [head @ self.hand(self._time(i)) for i, head in enumerate(heads)]
+        head = self.head.piece(self._time(0))
+        heads = [head(self._time(i)) for i in range(count + 1)]
+        hands = [pose @ self.hand(self._time(i)) for i, pose in enumerate(heads)]
         winds = [self.wind(self._time(i + 0.5)) for i in range(count)]
         drive = kernels.Drive(np.array(heads), np.array(winds), np.array(hands))
         report = kernels.advance(self.state, self.rest, self.field, drive, settings)
         self.step += count
         self._diagnostics = _summary(report)
         self.check()
+        if self.head.piece(self._time(0)) is not head:
+            self._carry(self.head(self._time(0)) @ inverse(heads[-1]))
+
+    def _carry(self, jump: Pose) -> None:
+        """Carry everything rigidly over a jump (4, 4) of the head: points, and velocities turned."""
+        state, turn = self.state, jump[:3, :3].T
+        state.points[:] = place(jump, state.points)
+        state.velocity[:] = state.velocity @ turn
 
     def check(self) -> None:
         """Raise SimulationDiverged when a guide is not finite or torn."""
@@ -134,8 +144,7 @@ class Simulation:
         return (self.step + steps) * self.settings.dt
 
     def _first_points(self, points: NDArray[np.float32]) -> NDArray[np.float32] | NDArray[np.float64]:
-        pose = self.head(0.0)
-        moved = points.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
+        moved = place(self.head(0.0), points.astype(np.float64))
         return np.ascontiguousarray(moved, np.dtype(self.simulate.precision))
 
 

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.config.schema import Keyframe, Motion
-from pipeline.simulate.motion import head_motion, place, rotation_matrix, tip_motion
+from pipeline.simulate.motion import head_motion, tip_motion
+from pipeline.simulate.screws import place, rotation_matrix
 
 PRESETS = ("nod", "shake", "turn")
 STEP = 1e-5  # of the difference quotients [s]

@@ -13,8 +13,9 @@ from pipeline.bench.simulate import bench, round_head
 from pipeline.config.schema import Config, Keyframe, Motion, Simulate
 from pipeline.errors import InputError
 from pipeline.simulate import stage
-from pipeline.simulate.motion import head_motion, place, rotation_matrix
+from pipeline.simulate.motion import head_motion
 from pipeline.simulate.rest import rest_shape
+from pipeline.simulate.screws import place, rotation_matrix
 from pipeline.simulate.stepper import Guides, Simulation, SimulationDiverged
 
 GUIDES, POINTS = 37, 16
