@@ -2,12 +2,10 @@
 
 CSV: on each line 16 numbers, or 12 without the last row (0, 0, 0, 1), with a column before them that holds frames
 (counted from 1, as the pictures) or times [s]. A header that begins with "frame" or "time" tells which; without one,
-whole numbers are frames, and lines without that column follow one another frame by frame. Lines that begin with #
-and empty lines are skipped; commas, semicolons and blanks separate.
+whole numbers are frames, and lines without that column follow one another frame by frame.
 HDF5: a dataset "transforms" (F, 4, 4), and "time" (F,) [s] unless samples follow one another frame by frame.
 """
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipeline.errors import InputError
+from pipeline.strands.formats.table import Table, read_table
 
 Floats = NDArray[np.float64]
 Where = Callable[[int], str]
@@ -73,31 +72,12 @@ def _refuse(bad: ArrayLike, where: Where, what: str) -> None:
 
 
 def _read_csv(path: Path, fps: float) -> tuple[Floats, Floats, Where]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as text ({error}); give a .csv or .h5 file") from None
-    header, rows, lines = "", [], []
-    for number, line in enumerate(text.splitlines(), start=1):
-        words = re.split(r"[,;\s]+", line.strip().strip(",;"))
-        if words[0] == "" or words[0].startswith("#"):
-            continue
-        try:
-            rows.append([float(word) for word in words])
-            lines.append(number)
-        except ValueError:
-            if rows or header:
-                raise InputError(f"{path}:{number}: not a line of numbers: {line.strip()[:40]}") from None
-            header = words[0].strip("\"'").lower()
-        if rows and (len(rows[-1]) != len(rows[0]) or len(rows[0]) not in (12, 13, 16, 17)):
-            raise InputError(
-                f"{path}:{number}: {len(rows[-1])} numbers; a line has 12 or 16, or one more for frame or time"
-            )
-    values = np.array(rows, np.float64).reshape(len(rows), -1) if rows else np.zeros((0, 16))
-    return *_columns(path, values, header, fps), lambda row: f"{path}:{lines[row]}"
+    table = read_table(path, (16, 12, 13, 17), "a line has 12 or 16, or one more for frame or time")
+    return *_columns(table, fps), table.where
 
 
-def _columns(path: Path, values: Floats, header: str, fps: float) -> tuple[Floats, Floats]:
+def _columns(table: Table, fps: float) -> tuple[Floats, Floats]:
+    values, header = table.values, table.header[0] if table.header else ""
     count = len(values)
     matrices = np.tile(np.eye(4), (count, 1, 1))
     entries = values.shape[1] // 4 * 4
@@ -106,7 +86,7 @@ def _columns(path: Path, values: Floats, header: str, fps: float) -> tuple[Float
         return np.arange(count) / fps, matrices
     first = values[:, 0]
     if header not in ("", "frame", "time"):
-        raise InputError(f'{path}: the first column is called {header}; expected "frame" or "time"')
+        raise InputError(f'{table.path}: the first column is called {header}; expected "frame" or "time"')
     if header == "frame" or (header == "" and (first == np.round(first)).all()):
         return (first - 1) / fps, matrices
     return first, matrices

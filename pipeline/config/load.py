@@ -20,7 +20,9 @@ from pipeline.errors import InputError
 FILES: dict[tuple[str, ...], tuple[str, ...]] = {  # keys that name a file, and the words that do not
     ("scene", "head"): ("builtin", "none"),
     ("groom", "source"): ("procedural", "swatch"),
+    ("groom", "pins"): (),
     ("simulate", "motion", "file"): (),
+    ("simulate", "tips_file"): (),
 }
 
 

@@ -17,10 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.cache.transforms import read_transforms
-from pipeline.config.schema import Keyframe, Motion
+from pipeline.config.schema import Keyframe, Motion, Simulate
 from pipeline.errors import InputError
 from pipeline.simulate.screws import (
-    Curve,
     Pose,
     Vector,
     curve_of_keys,
@@ -137,12 +136,14 @@ def _track(motion: Motion, path: Path, fps: float) -> HeadMotion:
     firsts = np.searchsorted(times, np.array(starts) - _SOON)
     pieces = []
     for first, last, end in zip(firsts, [*firsts[1:], len(times)], [*starts[1:], times[-1]], strict=True):
-        _refuse_half_turns(path, times[first:last], poses[first:last])
-        pieces.append(_from_zero(curve_of_track(times[first:last], poses[first:last], end)))
+        pieces.append(_one_piece(path, times[first:last], poses[first:last], end))
     return HeadMotion((-np.inf, *starts[1:]), tuple(pieces))
 
 
-def _from_zero(curve: Curve) -> Poses:
+def _one_piece(path: Path, times: Vector, poses: Pose, until: float | None = None) -> Poses:
+    """The smooth curve through samples of a file; what it is at time 0 before that."""
+    _refuse_half_turns(path, times, poses)
+    curve = curve_of_track(times, poses, until)
     return lambda time: curve(max(time, 0.0))
 
 
@@ -157,21 +158,27 @@ def _refuse_half_turns(path: Path, times: Vector, poses: Pose) -> None:
         )
 
 
-def tip_motion(keyframes: Sequence[Keyframe], centre: Vector, lead: float) -> Poses:
+def hand_motion(simulate: Simulate, centre: Vector) -> Poses:
     """The pose (4, 4) of the hand that holds pinned tips at a time [s], in the head's frame.
 
-    The tips move as one body that turns about `centre` (3,) [m]. Before time 0 they are brought from where they
-    are at rest to their first pose, which they reach `lead` [s] early.
+    The tips move as one body that turns about `centre` (3,) [m]. In the second quarter of the settling they are brought
+    from where they are at rest to their first pose. Raises InputError for a file that fails.
     """
-    if not keyframes:
+    if simulate.tips_file is not None:
+        path = _one_piece(Path(simulate.tips_file), *read_transforms(Path(simulate.tips_file), simulate.fps))
+        first = rigid(np.zeros(3), -centre) @ path(0.0) @ rigid(np.zeros(3), centre)
+        start = np.concatenate([rotation_vector(first[:3, :3]), first[:3, 3]])
+    elif simulate.tips:
+        path = keyed_path(simulate.tips, centre)
+        start = np.array([*simulate.tips[0].rotation, *simulate.tips[0].position])
+    else:
         return lambda _: np.eye(4)
-    path = keyed_path(keyframes, centre)
-    first = keyframes[0]
+    lead = simulate.settle / 2
 
     def pose(time: float) -> Pose:
         if time < 0 < lead:
             part = ease(2 + time / lead)
-            return rigid(part * np.array(first.rotation), part * np.array(first.position), centre)
+            return rigid(part * start[:3], part * start[3:], centre)
         return path(time)
 
     return pose

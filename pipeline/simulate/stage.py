@@ -54,7 +54,7 @@ def read_guides(experiment: cache.Experiment) -> tuple[Guides, NDArray[np.uint32
         strand = groom["guides/strand"][:]
         guides = Guides(
             points=groom["strands/points"][strand],
-            pins=groom["strands/pins"][strand],
+            held=groom["strands/held"][strand],
             offset=groom["guides/offset"][:],
             field=distance_field(groom),
         )

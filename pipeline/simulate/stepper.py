@@ -11,10 +11,11 @@ from pipeline import kernels
 from pipeline.cache import Frame
 from pipeline.config.schema import Simulate
 from pipeline.errors import InputError
-from pipeline.simulate.motion import head_motion, tip_motion
+from pipeline.simulate.motion import hand_motion, head_motion
 from pipeline.simulate.rest import rest_shape, settling, step_settings
 from pipeline.simulate.screws import Pose, inverse, place
 from pipeline.simulate.wind import wind
+from pipeline.strands.held import HAND
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -39,8 +40,8 @@ class Guides:
 
     points: NDArray[np.float32]
     """(G, P, 3) [m]: the groom, which is the rest shape."""
-    pins: NDArray[np.uint8]
-    """(G, 2): held points at root and tip."""
+    held: NDArray[np.uint8]
+    """(G, P): 0 free, 1 held by the head, 2 held by the hand."""
     offset: NDArray[np.float32]
     """(G, P) [m]: distance that points keep from the head."""
     field: kernels.DistanceField | None = None
@@ -55,16 +56,16 @@ class Simulation:
     """
 
     def __init__(self, simulate: Simulate, seed: int, guides: Guides) -> None:
-        if simulate.tips and not guides.pins[:, 1].any():
+        if (simulate.tips or simulate.tips_file) and not (guides.held == HAND).any():
             raise InputError(
-                "simulate.tips: no strand has a pinned tip to move; set groom.swatch.pin_tips = true"
+                "simulate.tips: no strand has a pinned tip to move; set groom.swatch.pin_tips = true or groom.pins"
             )
         self.simulate = simulate
-        self.rest = rest_shape(simulate.hair, guides.points, guides.pins, guides.offset)
+        self.rest = rest_shape(simulate.hair, guides.points, guides.held, guides.offset)
         self.field = guides.field
         self.settings = step_settings(simulate)
         self.head = head_motion(simulate.motion, simulate.fps)
-        self.hand = tip_motion(simulate.tips, _middle_of_tips(guides), simulate.settle / 2)
+        self.hand = hand_motion(simulate, _middle_of_held(guides))
         self.wind = wind(simulate.air, seed)
         self.step = 0
         self.state = kernels.at_rest(self._first_points(guides.points))
@@ -158,8 +159,10 @@ def _summary(report: kernels.Report | None) -> dict[str, float]:
     }
 
 
-def _middle_of_tips(guides: Guides) -> NDArray[np.float64]:
-    held = guides.pins[:, 1] > 0
+def _middle_of_held(guides: Guides) -> NDArray[np.float64]:
+    """The middle (3,) [m] of the outermost points that the hand holds."""
+    held = guides.held == HAND
+    outermost = held & ~np.pad(held[:, 1:], ((0, 0), (0, 1)))
     if not held.any():
         return np.zeros(3)
-    return np.asarray(guides.points[held, -1].mean(axis=0, dtype=np.float64))
+    return np.asarray(guides.points[outermost].mean(axis=0, dtype=np.float64))

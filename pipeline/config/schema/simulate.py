@@ -125,3 +125,11 @@ class Simulate(Section):
     """Motion of the head."""
     tips: Keyframes = ()
     """Motion of pinned tips relative to the head, as keyframes."""
+    tips_file: str | None = None
+    """Motion of pinned tips relative to the head, as a file of transforms [m] (see motion.file)."""
+
+    @model_validator(mode="after")
+    def _one_motion_of_tips(self) -> "Simulate":
+        if self.tips and self.tips_file is not None:
+            raise ValueError("the motion of tips comes from tips or from tips_file; remove one of them")
+        return self
