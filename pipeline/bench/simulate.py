@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pipeline import kernels
 from pipeline.config.schema import Motion, Simulate
 from pipeline.simulate.stepper import Guides, Simulation
+from pipeline.strands.held import held_ends
 
 _HEAD = 0.1  # radius [m]
 _LENGTH = 0.25
@@ -57,7 +58,7 @@ def round_head(guides: int, points: int) -> Guides:
     distance = np.linalg.norm(strands, axis=-1) - _HEAD
     return Guides(
         points=strands.astype(np.float32),
-        pins=np.tile(np.array([2, 0], np.uint8), (guides, 1)),
+        held=held_ends(np.tile([2, 0], (guides, 1)), points),
         offset=np.clip(distance, _OFFSET, _LIFT).astype(np.float32),
         field=_sphere(),
     )

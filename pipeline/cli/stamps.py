@@ -5,7 +5,7 @@ from pathlib import Path
 from pipeline.cache import Experiment, replacing
 from pipeline.cli.stages import Batch
 from pipeline.config import STAGES, Loaded
-from pipeline.config.load import FILES
+from pipeline.config.load import named_files
 
 _RULES = """\
 # Rules of {config}, written by `ringlet keys`; made again whenever one of these files changes.
@@ -61,9 +61,7 @@ def _stamp(experiment: Experiment, stage: str) -> Path:
 
 def _sources(loaded: Loaded) -> list[Path]:
     """List the config, what it extends and the files that it names."""
-    named = [str(getattr(getattr(loaded.config, table), key)) for table, key in FILES]
-    words = {word for group in FILES.values() for word in group}
-    return [*loaded.files, *(Path(name) for name in named if name not in words)]
+    return [*loaded.files, *named_files(loaded.config).values()]
 
 
 def _write(path: Path, text: str) -> None:

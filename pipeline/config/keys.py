@@ -10,7 +10,7 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from pipeline.config.load import FILES
+from pipeline.config.load import named_files
 from pipeline.config.schema import Config
 from pipeline.config.tree import KeyPath, dotted
 
@@ -59,8 +59,8 @@ def stage_keys(config: Config) -> dict[str, str]:
 def stage_inputs(config: Config) -> dict[str, Inputs]:
     """What goes into each key, flat: {"scene.lights[0].irradiance": 4.0, ..., "stage groom": its key}."""
     values = config.model_dump(mode="json")
-    for path in FILES:
-        _stand_in(values, path)
+    for key, path in named_files(config).items():
+        _stand_in(values, key, path)
     flat = _flat(values, ())
     stages: dict[str, Inputs] = {}
     for stage in STAGES:
@@ -122,12 +122,12 @@ def _file_digest(path: Path, size: int, time: int) -> str:  # noqa: ARG001, they
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=8)).hexdigest()
 
 
-def _stand_in(values: dict[str, Any], path: tuple[str, str]) -> None:
+def _stand_in(values: dict[str, Any], key: tuple[str, ...], path: Path) -> None:
     """Put a file's content in place of its path: moving it changes nothing, editing it does."""
-    table = values[path[0]]
-    value = table[path[1]]
-    if value not in FILES[path]:
-        table[path[1]] = f"{Path(value).name} ({file_digest(Path(value))})"
+    table = values
+    for name in key[:-1]:
+        table = table[name]
+    table[key[-1]] = f"{path.name} ({file_digest(path)})"
 
 
 def _flat(value: Any, path: KeyPath) -> Inputs:

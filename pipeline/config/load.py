@@ -17,9 +17,12 @@ from pipeline.config.toml_lines import key_lines
 from pipeline.config.tree import KeyPath, Tree, dotted, parse_key
 from pipeline.errors import InputError
 
-FILES: dict[tuple[str, str], tuple[str, ...]] = {  # keys that name a file, and the words that do not
+FILES: dict[tuple[str, ...], tuple[str, ...]] = {  # keys that name a file, and the words that do not
     ("scene", "head"): ("builtin", "none"),
     ("groom", "source"): ("procedural", "swatch"),
+    ("groom", "pins"): (),
+    ("simulate", "motion", "file"): (),
+    ("simulate", "tips_file"): (),
 }
 
 
@@ -51,6 +54,18 @@ def load(path: Path, overrides: tuple[str, ...] = ()) -> Loaded:
         raise InputError.joined(missing)
     origins = {dotted(key): origin for key, origin in tree.origins.items()}
     return Loaded(config, origins, tuple(files))
+
+
+def named_files(config: Config) -> dict[tuple[str, ...], Path]:
+    """The files that a config names, by key."""
+    found = {}
+    for key, words in FILES.items():
+        value: Any = config
+        for name in key:
+            value = getattr(value, name)
+        if value is not None and value not in words:
+            found[key] = Path(value)
+    return found
 
 
 def _read(path: Path, files: list[Path]) -> Tree:
@@ -141,4 +156,5 @@ def _resolve(tree: Tree, key: KeyPath, words: tuple[str, ...]) -> str | None:
     if file.is_file():
         return None
     listed = ", ".join(f'"{word}"' for word in words)
-    return f"{tree.label(key)}: no such file: {file}; give a file or one of {listed}"
+    remedy = f"give a file or one of {listed}" if words else "check its path, which is relative to the config"
+    return f"{tree.label(key)}: no such file: {file}; {remedy}"

@@ -13,6 +13,7 @@ from pipeline.groom.heads import Head
 from pipeline.groom.repairs import LONGEST, SHORTEST, Repairs, cleaned, pushed_out, turned
 from pipeline.progress import say
 from pipeline.strands.formats import Ragged, read_groom
+from pipeline.strands.held import held_ends, read_held
 from pipeline.strands.random import hashed
 from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
@@ -46,11 +47,15 @@ def load(config: Config, head: Head | None) -> tuple[Strands, dict[str, Any]]:
     points, pins = evenly_spaced(kept, groom.points)
     if head is not None:
         points, pins = _on_the_head(points, pins, index, head, repairs, path)
+    pins[:, 0] = np.maximum(pins[:, 0], 2)  # hair is clamped in its skin: that takes two points
     for line in repairs.lines():
         say("groom", f"{path.name}: {line}")
     order = progressive_order(points[:, 0], config.seed)[: groom.strands]
     report = {"source": path.name, "file_strands": len(file), "repairs": vars(repairs)}
-    return _strands(config, points[order], pins[order], head), report
+    held = held_ends(pins, groom.points)
+    if groom.pins is not None:
+        held = read_held(Path(groom.pins), len(file), groom.points)[index]
+    return _strands(config, points[order], held[order], head), report
 
 
 def evenly_spaced(strands: Ragged, count: int) -> tuple[Vectors, Pins]:
@@ -107,15 +112,14 @@ def _on_the_head(
     return points, pins
 
 
-def _strands(config: Config, points: Vectors, pins: Pins, head: Head | None) -> Strands:
+def _strands(config: Config, points: Vectors, held: Pins, head: Head | None) -> Strands:
     start = points[:, 1] - points[:, 0]
     normal = start / np.linalg.norm(start, axis=1, keepdims=True)
     if head is not None:
         normal = head.field.sample(points[:, 0])[1]
-    pins[:, 0] = np.maximum(pins[:, 0], 2)  # hair is clamped in its skin: that takes two points
     return Strands(
         points=points.astype(np.float32),
-        pins=pins,
+        held=held,
         normal=normal.astype(np.float32),
         side=np.zeros(len(points), np.int8),
         key=hashed(config.seed, np.arange(len(points)), _KEY),

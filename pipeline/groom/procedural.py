@@ -21,6 +21,7 @@ from pipeline.groom.partings import PartingLine
 from pipeline.groom.paths import STEP, Terrain, cut_lengths, grow, traits
 from pipeline.groom.repairs import pushed_out
 from pipeline.groom.roots import place_roots
+from pipeline.strands.held import held_ends
 from pipeline.strands.random import hashed, uniform
 from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
@@ -78,7 +79,7 @@ class Style:
         points = self._evened(points)
         return Strands(
             points=self.head.to_world(points).astype(np.float32),
-            pins=np.tile(np.array([2, 0], np.uint8), (len(index), 1)),
+            held=held_ends(np.tile([2, 0], (len(index), 1)), self.groom.points),
             normal=self.normals[index].astype(np.float32),
             side=side,
             key=hashed(self.seed, index, _KEY),

@@ -2,13 +2,16 @@
 
 strands/points (S, P, 3) f32 [m]   rest shapes in the head's rest pose, equal spacing; any prefix is a valid groom
 strands/normal (S, 3) f32          scalp normal at the root
-strands/side (S,) i8, key (S,) u32, pins (S, 2) u8
+strands/side (S,) i8, key (S,) u32
+strands/held (S, P) u8             0 free, 1 held by the head, 2 by the hand
 guides/strand (G,) u32             which strands are simulated, ascending
 guides/offset (G, P) f32 [m]       distance that their points keep from the skin
 head/points, triangles, normals, albedo, distance, origin, spacing     unless scene.head = "none"
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +23,7 @@ from pipeline.groom.heads import Head, make_head
 from pipeline.groom.procedural import Style
 from pipeline.groom.swatch import swatch
 from pipeline.progress import say, track
+from pipeline.strands.held import read_held
 from pipeline.strands.strands import Strands
 
 _HELD_UP = 0.8  # part of its groomed distance from the skin that a guide keeps
@@ -66,14 +70,26 @@ def contact_offset(config: Config, head: Head | None, guides: NDArray[np.float32
 def _source(config: Config, head: Head | None) -> tuple[Iterable[Strands], int, dict[str, object]]:
     """The strands in chunks, their number, and what there is to report."""
     if config.groom.source == "swatch":
-        return [swatch(config)], config.groom.strands, {}
+        return _pinned(config, [swatch(config)]), config.groom.strands, {}
     if config.groom.source == "procedural" and head is not None:
         style = Style(config, head)
-        return style.chunks(), len(style.roots), {}
+        return _pinned(config, style.chunks()), len(style.roots), {}
     from pipeline.groom.imported import load
 
     strands, report = load(config, head)
     return [strands], len(strands), report
+
+
+def _pinned(config: Config, chunks: Iterable[Strands]) -> Iterator[Strands]:
+    """The chunks with points held as the file of pins says, if there is one."""
+    if config.groom.pins is None:
+        yield from chunks
+        return
+    held = read_held(Path(config.groom.pins), config.groom.strands, config.groom.points)
+    begin = 0
+    for strands in chunks:
+        yield replace(strands, held=held[begin : begin + len(strands)])
+        begin += len(strands)
 
 
 def _write_strands(
@@ -101,7 +117,7 @@ def _columns(writer: cache.Writer, points: int) -> dict[str, "cache.columns.Colu
         "normal": ((3,), np.float32),
         "side": ((), np.int8),
         "key": ((), np.uint32),
-        "pins": ((2,), np.uint8),
+        "held": ((points,), np.uint8),
     }
     return {name: writer.stream(f"strands/{name}", shape, kind) for name, (shape, kind) in layout.items()}
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from pipeline.config.schema import Config
 from pipeline.groom.curls import curled
+from pipeline.strands.held import held_ends
 from pipeline.strands.random import hashed
 from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
@@ -31,7 +32,7 @@ def swatch(config: Config) -> Strands:
         points = resampled(points, groom.points)
     return Strands(
         points=points.astype(np.float32),
-        pins=np.tile(np.array([2, 2 if groom.swatch.pin_tips else 0], np.uint8), (len(index), 1)),
+        held=held_ends(np.tile([2, 2 if groom.swatch.pin_tips else 0], (len(index), 1)), groom.points),
         normal=np.tile(direction, (len(index), 1)).astype(np.float32),
         side=np.zeros(len(index), np.int8),
         key=hashed(config.seed, index, 7),

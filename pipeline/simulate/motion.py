@@ -1,44 +1,58 @@
-"""Poses over simulated time: presets of the head's motion and keyframes.
+"""Poses over simulated time: presets of the head's motion, keyframes and files of transforms.
 
 A pose is a rigid map (4, 4) float64 from the rest pose to world space. Time 0 is the first frame; before it the
-head stands still while the hair settles. Every motion is a smooth function of time that starts and ends at rest.
+head stands still while the hair settles. Presets and keyframes start and end at rest; a file moves as it does, and is
+held after its last sample. Between samples of a file the head moves on a smooth curve of screws, between keyframes the
+pivot on a smooth curve in space and the head about it on one of rotations (screws.py).
+
+Where the head jumps (teleport) its motion is one of several pieces, each smooth in itself: the piece before the jump
+goes on with its last velocity until then, and the strands are carried over rigidly.
 """
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.config.schema import Keyframe, Motion
+from pipeline.cache.transforms import read_transforms
+from pipeline.config.schema import Keyframe, Motion, Simulate
+from pipeline.errors import InputError
+from pipeline.simulate.screws import (
+    Pose,
+    Vector,
+    curve_of_keys,
+    curve_of_track,
+    inverse,
+    rigid,
+    rotation_vector,
+)
 
-Vector = NDArray[np.float64]
-Pose = NDArray[np.float64]
 Signal = Callable[[float], float]
+Poses = Callable[[float], Pose]
 
 _AXES = {"nod": (1.0, 0.0, 0.0), "shake": (0.0, 1.0, 0.0), "turn": (0.0, 1.0, 0.0)}
+_HALF_TURN = np.radians(170)  # from sample to sample: beyond it one cannot tell which way round
+_SOON = 1e-6  # [s] times this near are one
 
 
-def rotation_matrix(vector: Vector) -> Vector:
-    """The rotation about an axis by an angle, `vector` = axis times angle (3,) [rad], as (3, 3) (Rodrigues, 1840)."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine = np.sinc(angle / np.pi)
-    versine = np.sinc(angle / (2 * np.pi)) ** 2 / 2
-    return np.asarray(np.eye(3) + sine * cross + versine * cross @ cross)
+@dataclass(frozen=True)
+class HeadMotion:
+    """The head's pose over time, in pieces between which it jumps."""
 
+    starts: tuple[float, ...]
+    """[s]: when each piece begins; the first at minus infinity."""
+    pieces: tuple[Poses, ...]
+    """Pose (4, 4) at a time [s]."""
 
-def rigid(rotation: Vector, translation: Vector, pivot: Vector) -> Pose:
-    """A turn by the rotation vector `rotation` about `pivot`, then a translation, as a pose (4, 4)."""
-    pose = np.eye(4)
-    pose[:3, :3] = rotation_matrix(rotation)
-    pose[:3, 3] = pivot + translation - pose[:3, :3] @ pivot
-    return pose
+    def piece(self, time: float) -> Poses:
+        """The piece that holds from a time [s] on."""
+        return self.pieces[bisect_right(self.starts, time + _SOON) - 1]
 
-
-def place(pose: Pose, points: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Points (..., 3) [m] carried by a pose (4, 4); float64."""
-    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3], dtype=np.float64)
+    def __call__(self, time: float) -> Pose:
+        """The pose (4, 4) at a time [s]; where the head jumps, the one after it."""
+        return self.piece(time)(time)
 
 
 def ease(u: float) -> float:
@@ -74,53 +88,97 @@ def preset_angle(motion: Motion) -> Signal:
     return turn if motion.preset == "turn" else swing
 
 
-def keyframe_spline(keyframes: Sequence[Keyframe]) -> Callable[[float], Vector]:
-    """Position and rotation vector (6,) over time [s]: exact at the keyframes, smooth, and never past them.
-
-    Monotone cubic pieces (Fritsch & Butland 1984), at rest at both ends and held outside. Rotation vectors are
-    interpolated by component: for turns about one axis that is the angle itself, and several turns may be written.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    times = [frame.time for frame in keyframes]
-    values = [(*frame.position, *frame.rotation) for frame in keyframes]
-    spline = PchipInterpolator(  # a held keyframe on either side makes the end velocities zero
-        [times[0] - 1, *times, times[-1] + 1], [values[0], *values, values[-1]]
-    )
-    return lambda time: np.asarray(spline(np.clip(time, times[0], times[-1])), dtype=np.float64)
+def head_motion(motion: Motion, fps: float = 24.0) -> HeadMotion:
+    """The head's motion; `fps` counts the frames of a file and of jumps. Raises InputError for a file that fails."""
+    if motion.file is not None:
+        return _track(motion, Path(motion.file), fps)
+    if motion.keyframes:
+        return _keyed(motion, fps)
+    if motion.preset == "none":
+        return HeadMotion((-np.inf,), (lambda _: np.eye(4),))
+    pivot, axis, angle = np.array(motion.pivot), np.array(_AXES[motion.preset]), preset_angle(motion)
+    return HeadMotion((-np.inf,), (lambda time: rigid(axis * angle(time), np.zeros(3), pivot),))
 
 
-def head_motion(motion: Motion) -> Callable[[float], Pose]:
-    """The head's pose (4, 4) at a time [s]; the first pose before time 0."""
+def _keyed(motion: Motion, fps: float) -> HeadMotion:
+    jumps = [(frame - 1) / fps for frame in sorted(motion.teleport)]
+    groups = [
+        [key for key in motion.keyframes if after - _SOON <= key.time < before - _SOON]
+        for after, before in zip([-np.inf, *jumps], [*jumps, np.inf], strict=True)
+    ]
+    if not all(groups):
+        raise InputError("simulate.motion.teleport: no keyframe between two jumps; each needs one after it")
     pivot = np.array(motion.pivot)
-    if motion.preset == "none" and not motion.keyframes:
-        return lambda _: np.eye(4)
-    if not motion.keyframes:
-        axis, angle = np.array(_AXES[motion.preset]), preset_angle(motion)
-        return lambda time: rigid(axis * angle(time), np.zeros(3), pivot)
-    spline = keyframe_spline(motion.keyframes)
+    return HeadMotion((-np.inf, *jumps), tuple(keyed_path(keys, pivot) for keys in groups))
+
+
+def keyed_path(keyframes: Sequence[Keyframe], pivot: Vector) -> Poses:
+    """Pose (4, 4) at a time [s]: exact at the keyframes, smooth, never past them, held outside; first pose before 0."""
+    times = np.array([key.time for key in keyframes])
+    turns, ways = (np.array([getattr(key, name) for key in keyframes]) for name in ("rotation", "position"))
+    turn, way = curve_of_keys(times, turns, 0 * ways), curve_of_keys(times, 0 * turns, ways)
 
     def pose(time: float) -> Pose:
-        value = spline(max(time, 0.0))
-        return rigid(value[3:], value[:3], pivot)
+        time = max(time, 0.0)
+        return rigid(np.zeros(3), way(time)[:3, 3] + pivot) @ turn(time) @ rigid(np.zeros(3), -pivot)
 
     return pose
 
 
-def tip_motion(keyframes: Sequence[Keyframe], centre: Vector, lead: float) -> Callable[[float], Pose]:
+def _track(motion: Motion, path: Path, fps: float) -> HeadMotion:
+    times, poses = read_transforms(path, fps, motion.unit_scale)
+    jumps = [(frame - 1) / fps for frame in motion.teleport]
+    if motion.teleport_beyond is not None:
+        pivots = poses[:, :3, :3] @ np.array(motion.pivot) + poses[:, :3, 3]
+        far = np.linalg.norm(np.diff(pivots, axis=0), axis=1) > motion.teleport_beyond
+        jumps += times[1:][far].tolist()
+    starts = [float(times[0]), *sorted({time for time in jumps if times[0] < time <= times[-1]})]
+    firsts = np.searchsorted(times, np.array(starts) - _SOON)
+    pieces = []
+    for first, last, end in zip(firsts, [*firsts[1:], len(times)], [*starts[1:], times[-1]], strict=True):
+        pieces.append(_one_piece(path, times[first:last], poses[first:last], end))
+    return HeadMotion((-np.inf, *starts[1:]), tuple(pieces))
+
+
+def _one_piece(path: Path, times: Vector, poses: Pose, until: float | None = None) -> Poses:
+    """The smooth curve through samples of a file; what it is at time 0 before that."""
+    _refuse_half_turns(path, times, poses)
+    curve = curve_of_track(times, poses, until)
+    return lambda time: curve(max(time, 0.0))
+
+
+def _refuse_half_turns(path: Path, times: Vector, poses: Pose) -> None:
+    angle = np.linalg.norm(rotation_vector((inverse(poses[:-1]) @ poses[1:])[:, :3, :3]), axis=1)
+    wide = np.flatnonzero(angle > _HALF_TURN)
+    if len(wide):
+        raise InputError(
+            f"{path}: it turns by {np.degrees(angle[wide[0]]):.0f} degrees up to the sample at "
+            f"{times[wide[0] + 1]:g} s, and one cannot tell which way round; write more samples, or name the frame "
+            "in simulate.motion.teleport"
+        )
+
+
+def hand_motion(simulate: Simulate, centre: Vector) -> Poses:
     """The pose (4, 4) of the hand that holds pinned tips at a time [s], in the head's frame.
 
-    The tips move as one body that turns about `centre` (3,) [m]. Before time 0 they are brought from where they
-    are at rest to their first pose, which they reach `lead` [s] early.
+    The tips move as one body that turns about `centre` (3,) [m]. In the second quarter of the settling they are brought
+    from where they are at rest to their first pose. Raises InputError for a file that fails.
     """
-    if not keyframes:
+    if simulate.tips_file is not None:
+        path = _one_piece(Path(simulate.tips_file), *read_transforms(Path(simulate.tips_file), simulate.fps))
+        first = rigid(np.zeros(3), -centre) @ path(0.0) @ rigid(np.zeros(3), centre)
+        start = np.concatenate([rotation_vector(first[:3, :3]), first[:3, 3]])
+    elif simulate.tips:
+        path = keyed_path(simulate.tips, centre)
+        start = np.array([*simulate.tips[0].rotation, *simulate.tips[0].position])
+    else:
         return lambda _: np.eye(4)
-    spline = keyframe_spline(keyframes)
+    lead = simulate.settle / 2
 
     def pose(time: float) -> Pose:
-        value = spline(max(time, 0.0))
         if time < 0 < lead:
-            value = value * ease(2 + time / lead)
-        return rigid(value[3:], value[:3], centre)
+            part = ease(2 + time / lead)
+            return rigid(part * start[:3], part * start[3:], centre)
+        return path(time)
 
     return pose

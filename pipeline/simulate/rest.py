@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from pipeline import kernels
 from pipeline.config.schema import Hair, Simulate
 
-_HEAD, _HAND = 1, 2
-
 _STRAIGHTEST_CURL = (
     20.0  # [1/m]; wavy hair bends with radii up to 5 cm, the torsion of what bends less is noise
 )
@@ -32,17 +30,10 @@ def twisting_stiffness(hair: Hair) -> float:
     return hair.shear_modulus * np.pi * hair.radius**4 / 2
 
 
-def held_points(pins: NDArray[np.uint8], points: int) -> NDArray[np.uint8]:
-    """Who holds each point, (G, P) uint8: 0 nobody, 1 the head, 2 the hand; `pins` (G, 2) counts at root and tip."""
-    index = np.arange(points)
-    held = np.where(index < pins[:, :1], _HEAD, 0)
-    return np.where(index >= points - pins[:, 1:].astype(int), _HAND, held).astype(np.uint8)
-
-
 def rest_shape(
-    hair: Hair, points: NDArray[np.floating], pins: NDArray[np.uint8], offset: NDArray[np.floating]
+    hair: Hair, points: NDArray[np.floating], held: NDArray[np.uint8], offset: NDArray[np.floating]
 ) -> kernels.RestShape:
-    """The groom as rest shape: points (G, P, 3) [m], pins (G, 2) held at root and tip, contact offset (G, P) [m].
+    """The groom as rest shape: points (G, P, 3) [m], who holds them (G, P), contact offset (G, P) [m].
 
     Raises ValueError when points are not finite or a segment has no length.
     """
@@ -52,7 +43,7 @@ def rest_shape(
         np.full(count, mass_per_length(hair)),
         np.full(count, bending_stiffness(hair)),
         np.full(count, twisting_stiffness(hair)),
-        held_points(pins, points.shape[1]),
+        np.ascontiguousarray(held, np.uint8),
         np.ascontiguousarray(offset, np.float64),
         kappa_0=_STRAIGHTEST_CURL,
     )

@@ -23,6 +23,9 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
     """
     guides, strand = read_guides(experiment)
     simulation = Simulation(config.simulate, config.seed, guides)
+    jumps = [1 + round(start * config.simulate.fps) for start in simulation.head.starts[1:]]
+    if jumps:
+        say("simulate", f"the head jumps at frame {', '.join(map(str, jumps))}; hair is carried along")
     segments = cache.Segments(experiment.guides, key)
     kept = experiment.folder / "diverged.h5"
     kept.unlink(missing_ok=True)
@@ -51,7 +54,7 @@ def read_guides(experiment: cache.Experiment) -> tuple[Guides, NDArray[np.uint32
         strand = groom["guides/strand"][:]
         guides = Guides(
             points=groom["strands/points"][strand],
-            pins=groom["strands/pins"][strand],
+            held=groom["strands/held"][strand],
             offset=groom["guides/offset"][:],
             field=distance_field(groom),
         )

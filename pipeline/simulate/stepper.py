@@ -11,9 +11,11 @@ from pipeline import kernels
 from pipeline.cache import Frame
 from pipeline.config.schema import Simulate
 from pipeline.errors import InputError
-from pipeline.simulate.motion import head_motion, tip_motion
+from pipeline.simulate.motion import hand_motion, head_motion
 from pipeline.simulate.rest import rest_shape, settling, step_settings
+from pipeline.simulate.screws import Pose, inverse, place
 from pipeline.simulate.wind import wind
+from pipeline.strands.held import HAND
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -39,8 +41,8 @@ class Guides:
 
     points: NDArray[np.float32]
     """(G, P, 3) [m]: the groom, which is the rest shape."""
-    pins: NDArray[np.uint8]
-    """(G, 2): held points at root and tip."""
+    held: NDArray[np.uint8]
+    """(G, P): 0 free, 1 held by the head, 2 held by the hand."""
     offset: NDArray[np.float32]
     """(G, P) [m]: distance that points keep from the head."""
     field: kernels.DistanceField | None = None
@@ -55,16 +57,16 @@ class Simulation:
     """
 
     def __init__(self, simulate: Simulate, seed: int, guides: Guides) -> None:
-        if simulate.tips and not guides.pins[:, 1].any():
+        if (simulate.tips or simulate.tips_file) and not (guides.held == HAND).any():
             raise InputError(
-                "simulate.tips: no strand has a pinned tip to move; set groom.swatch.pin_tips = true"
+                "simulate.tips: no strand has a pinned tip to move; set groom.swatch.pin_tips = true or groom.pins"
             )
         self.simulate = simulate
-        self.rest = rest_shape(simulate.hair, guides.points, guides.pins, guides.offset)
+        self.rest = rest_shape(simulate.hair, guides.points, guides.held, guides.offset)
         self.field = guides.field
         self.settings = step_settings(simulate)
-        self.head = head_motion(simulate.motion)
-        self.hand = tip_motion(simulate.tips, _middle_of_tips(guides), simulate.settle / 2)
+        self.head = head_motion(simulate.motion, simulate.fps)
+        self.hand = hand_motion(simulate, _middle_of_held(guides))
         self.wind = wind(simulate.air, seed)
         self.step = 0
         self.state = self._first_state(guides.points)
@@ -107,14 +109,24 @@ class Simulation:
         self.step = int(saved["step"][0])
 
     def _advance(self, count: int, settings: kernels.StepSettings) -> None:
-        heads = [self.head(self._time(i)) for i in range(count + 1)]
-        hands = [head @ self.hand(self._time(i)) for i, head in enumerate(heads)]
+        head = self.head.piece(self._time(0))
+        heads = [head(self._time(i)) for i in range(count + 1)]
+        hands = [pose @ self.hand(self._time(i)) for i, pose in enumerate(heads)]
         winds = [self.wind(self._time(i + 0.5)) for i in range(count)]
         drive = kernels.Drive(np.array(heads), np.array(winds), np.array(hands))
         report = kernels.advance(self.state, self.rest, self.field, drive, settings)
         self.step += count
         self._diagnostics = _summary(report)
         self.check()
+        if self.head.piece(self._time(0)) is not head:
+            self._carry(self.head(self._time(0)) @ inverse(heads[-1]))
+
+    def _carry(self, jump: Pose) -> None:
+        """Carry everything rigidly over a jump (4, 4) of the head: points, velocities and directors."""
+        state, turn = self.state, jump[:3, :3].T
+        state.points[:] = place(jump, state.points)
+        state.velocity[:] = state.velocity @ turn
+        state.directors[:] = state.directors @ turn
 
     def check(self) -> None:
         """Raise SimulationDiverged when a guide is not finite or torn."""
@@ -129,7 +141,7 @@ class Simulation:
 
     def _first_state(self, points: NDArray[np.float32]) -> kernels.State:
         pose, precision = self.head(0.0), np.dtype(self.simulate.precision)
-        moved = points.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
+        moved = place(pose, points.astype(np.float64))
         directors = self.rest.directors @ pose[:3, :3].T
         return kernels.at_rest(
             np.ascontiguousarray(moved, precision), np.ascontiguousarray(directors, precision)
@@ -146,8 +158,10 @@ def _summary(report: kernels.Report | None) -> dict[str, float]:
     }
 
 
-def _middle_of_tips(guides: Guides) -> NDArray[np.float64]:
-    held = guides.pins[:, 1] > 0
+def _middle_of_held(guides: Guides) -> NDArray[np.float64]:
+    """The middle (3,) [m] of the outermost points that the hand holds."""
+    held = guides.held == HAND
+    outermost = held & ~np.pad(held[:, 1:], ((0, 0), (0, 1)))
     if not held.any():
         return np.zeros(3)
-    return np.asarray(guides.points[held, -1].mean(axis=0, dtype=np.float64))
+    return np.asarray(guides.points[outermost].mean(axis=0, dtype=np.float64))

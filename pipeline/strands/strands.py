@@ -17,8 +17,8 @@ class Strands:
 
     points: NDArray[np.float32]
     """(S, P, 3) [m], in the head's rest pose."""
-    pins: NDArray[np.uint8]
-    """(S, 2): points held at the root and at the tip; (2, 0) is a clamped root."""
+    held: NDArray[np.uint8]
+    """(S, P): 0 free, 1 held by the head, 2 held by the hand; two held points at the root are a clamp."""
     normal: NDArray[np.float32]
     """(S, 3): unit normal of the scalp at the root."""
     side: NDArray[np.int8]
@@ -28,7 +28,7 @@ class Strands:
 
     def __post_init__(self) -> None:
         count = len(self.points)
-        shapes = {"pins": (count, 2), "normal": (count, 3), "side": (count,), "key": (count,)}
+        shapes = {"held": self.points.shape[:2], "normal": (count, 3), "side": (count,), "key": (count,)}
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise InputError(f"strands: {name} has shape {getattr(self, name).shape}, expected {shape}")

@@ -76,6 +76,15 @@ def test_a_files_content_counts_and_its_place_does_not(tmp_path: Path) -> None:
     assert all(a[stage] != c[stage] for stage in STAGES)
 
 
+def test_the_content_of_a_motion_file_counts_for_the_simulation_alone(tmp_path: Path) -> None:
+    motion = tmp_path / "head.csv"
+    motion.write_text("one")
+    given = keys(tmp_path, BASE, "simulate.motion.file=" + str(motion))
+    motion.write_text("the other")
+    edited = keys(tmp_path, BASE, "simulate.motion.file=" + str(motion))
+    assert {stage for stage in STAGES if given[stage] != edited[stage]} == {"simulate", "render"}
+
+
 def test_the_value_that_made_a_stage_stale_is_named(tmp_path: Path) -> None:
     path = tmp_path / "x.toml"
     path.write_text(BASE + SIMULATE)

@@ -32,7 +32,7 @@ from pipeline.groom.swatch import swatch
 from pipeline.strands.random import normal, uniform
 from pipeline.strands.strands import Strands
 
-COLUMNS = ("points", "pins", "normal", "side", "key")
+COLUMNS = ("points", "held", "normal", "side", "key")
 CURLY = Groom(
     strands=800,
     points=64,
@@ -220,7 +220,7 @@ def test_a_swatch_has_the_wanted_length_and_direction(radius: float) -> None:
     assert np.abs(strands.points[:, 0]).max() <= 0.01 + 1e-6
     assert np.abs(strands.points[:, 0, 2]).max() < 1e-9
     assert np.abs(tip[:, 2] - 0.1).max() < 0.005
-    assert (strands.pins == 2).all()
+    assert (strands.held[:, [0, 1, 2, -3, -2, -1]] == [1, 1, 0, 0, 2, 2]).all()
     assert unequal(strands.points) < 1e-3
     if radius == 0:
         assert np.abs(strands.length - 0.1).max() < 1e-6

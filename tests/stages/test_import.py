@@ -273,4 +273,5 @@ def test_a_real_groom_without_a_head_loses_its_degenerate_strands() -> None:
     print(f"{len(strands)} of 2,228 strands; without length: {report['repairs']['no_length']}")
     assert len(strands) + len(report["repairs"]["no_length"]) == 2_228
     assert len(report["repairs"]["no_length"]) < 20
-    assert (strands.pins == [2, 0]).all()
+    assert (strands.held[:, :3] == [1, 1, 0]).all()
+    assert not strands.held[:, 2:].any()

@@ -12,6 +12,7 @@ from pipeline.interpolate.copies import Roots
 from pipeline.interpolate.follow import GuideSet, shape_of
 from pipeline.simulate.stepper import Guides, Simulation
 from pipeline.strands.expand import Binding, Expansion
+from pipeline.strands.held import held_ends
 from tests.conftest import helix
 
 Floats = NDArray[np.float64]
@@ -38,9 +39,9 @@ def hung(rest: Floats) -> Floats:
     """Every strand on its own, at rest with the head tilted by 70 degrees."""
     tilted = (9.81 * np.sin(1.22), -9.81 * np.cos(1.22), 0.0)
     simulate = Simulate(settle=4.0, gravity=tilted, precision="float64", hair=Hair(radius=35e-6))
-    pins = np.tile(np.array([2, 0], np.uint8), (len(rest), 1))
+    held = held_ends(np.tile([2, 0], (len(rest), 1)), rest.shape[1])
     offset = np.zeros(rest.shape[:2], np.float32)
-    simulation = Simulation(simulate, 1, Guides(rest.astype(np.float32), pins, offset))
+    simulation = Simulation(simulate, 1, Guides(rest.astype(np.float32), held, offset))
     simulation.settle()
     return np.asarray(simulation.frame().points, np.float64)
 

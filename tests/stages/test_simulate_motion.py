@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.config.schema import Keyframe, Motion
-from pipeline.simulate.motion import head_motion, place, rotation_matrix, tip_motion
+from pipeline.config.schema import Keyframe, Motion, Simulate
+from pipeline.simulate.motion import hand_motion, head_motion
+from pipeline.simulate.screws import place, rotation_matrix
 
 PRESETS = ("nod", "shake", "turn")
 STEP = 1e-5  # of the difference quotients [s]
@@ -87,14 +88,16 @@ def test_a_single_keyframe_is_a_pose() -> None:
 
 def test_tips_turn_about_their_centre() -> None:
     centre = np.array([0.0, -0.2, 0.01])
-    assert np.array_equal(tip_motion((), centre, 1.0)(1.0), np.eye(4))
-    pose = tip_motion(KEYFRAMES, centre, 1.0)
+    assert np.array_equal(hand_motion(Simulate(), centre)(1.0), np.eye(4))
+    pose = hand_motion(Simulate(tips=KEYFRAMES), centre)
     moved = [place(pose(frame.time), centre) - centre for frame in KEYFRAMES]
     assert np.abs(np.array(moved) - [frame.position for frame in KEYFRAMES]).max() < 1e-15
 
 
 def test_tips_are_brought_to_their_first_pose_before_the_first_frame() -> None:
-    pose = tip_motion((Keyframe(time=0.0, position=(0.1, 0.0, 0.0)),), np.zeros(3), 0.5)
+    pose = hand_motion(
+        Simulate(tips=(Keyframe(time=0.0, position=(0.1, 0.0, 0.0)),), settle=1.0), np.zeros(3)
+    )
     ways = [float(pose(time)[0, 3]) for time in (-1.0, -0.75, -0.5, 0.0)]
     assert ways == pytest.approx([0.0, 0.05, 0.1, 0.1], abs=1e-15)
 

@@ -13,9 +13,11 @@ from pipeline.bench.simulate import bench, round_head
 from pipeline.config.schema import Config, Keyframe, Motion, Simulate
 from pipeline.errors import InputError
 from pipeline.simulate import stage
-from pipeline.simulate.motion import head_motion, place, rotation_matrix
+from pipeline.simulate.motion import head_motion
 from pipeline.simulate.rest import rest_shape
+from pipeline.simulate.screws import place, rotation_matrix
 from pipeline.simulate.stepper import Guides, Simulation, SimulationDiverged
+from pipeline.strands.held import held_ends
 
 GUIDES, POINTS = 37, 16
 SHAKE = Motion(preset="shake", period=0.4, amplitude=0.6, pivot=(0.0, -0.05, 0.0))
@@ -111,7 +113,7 @@ def test_rest_torsion_of_nearly_straight_hair_is_bounded() -> None:
     """Without the bound, noise of 1e6 /m tears curls whose roots are straight, under "frenet"."""
     late = curls_with_straight_roots(GUIDES)
     unbounded = np.nanmax(np.abs(kernels.torsion(late.points.astype(np.float64), "equal")))
-    rest = rest_shape(SHORT.hair, late.points, late.pins, late.offset)
+    rest = rest_shape(SHORT.hair, late.points, late.held, late.offset)
     turn = np.abs(rest.torsion * rest.length.mean(axis=1, keepdims=True)).max()
     print(f"largest torsion {unbounded:.1e} /m, bounded to {turn:.2f} rad a segment")
     assert turn <= np.pi + 1e-9 < unbounded * rest.length.mean()
@@ -126,16 +128,16 @@ def curls_with_straight_roots(count: int) -> Guides:
     radius = 0.008 * np.clip((along - 0.03) / 0.08, 0, 1)
     curl = np.stack([radius * np.cos(along * 300), -along, radius * np.sin(along * 300)], axis=-1)
     slanted = [curl @ rotation_matrix(np.array([2.0, 0.0, 0.01 * i])) for i in range(count)]
-    pins = np.tile(np.array([2, 0], np.uint8), (count, 1))
-    return Guides(np.array(slanted, np.float32), pins, np.zeros((count, 32), np.float32))
+    held = held_ends(np.tile([2, 0], (count, 1)), 32)
+    return Guides(np.array(slanted, np.float32), held, np.zeros((count, 32), np.float32))
 
 
 def swatch(count: int = 3) -> Guides:
     points = np.zeros((count, POINTS, 3), np.float32)
     points[..., 1] = -np.linspace(0, 0.2, POINTS)
     points[..., 0] = 0.01 * np.arange(count)[:, None]
-    pins = np.tile(np.array([2, 2], np.uint8), (count, 1))
-    return Guides(points, pins, np.zeros((count, POINTS), np.float32))
+    held = held_ends(np.tile([2, 2], (count, 1)), POINTS)
+    return Guides(points, held, np.zeros((count, POINTS), np.float32))
 
 
 def test_pinned_tips_follow_their_keyframes_relative_to_the_head() -> None:
@@ -185,7 +187,7 @@ def experiment_with_groom(folder: Path, guides: Guides) -> cache.Experiment:
     experiment = cache.Experiment(folder)
     with cache.create(experiment.groom, kind="groom", key="groom") as writer:
         writer.write("strands/points", guides.points)
-        writer.write("strands/pins", guides.pins)
+        writer.write("strands/held", guides.held)
         writer.write("guides/strand", np.arange(len(guides.points), dtype=np.uint32))
         writer.write("guides/offset", guides.offset)
     return experiment

@@ -108,6 +108,8 @@ class Groom(Section):
     """Metres per unit of the groom file."""
     up_axis: Literal["x", "y", "z"] = "y"
     """Which axis of the groom file points up."""
+    pins: str | None = None
+    """A file of held points, relative to the config: a row a strand of .csv or .npy, either two numbers (held at root and tip; 1 is a hinge, 2 a clamp) or one a point (0 free, 1 by the head, 2 by the hand)."""
     strands: Annotated[int, Field(ge=1, le=10_000_000)] = 60_000
     """Number of strands; of a file, the first so many of its strands in progressive order."""
     guides: Annotated[int, Field(ge=1, le=100_000)] = 1_000

@@ -3,7 +3,7 @@
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config.schema.base import Position, Section, Velocity
 from pipeline.config.units import Acceleration, Angle, Density, Duration, Length, Pressure, Rate, Speed
@@ -65,7 +65,7 @@ Keyframes = Annotated[tuple[Keyframe, ...], AfterValidator(_ascending)]
 
 class Motion(Section):
     preset: Literal["none", "nod", "shake", "turn"] = "none"
-    """A motion of the head about its pivot; keyframes replace it."""
+    """A motion of the head about its pivot; keyframes or a file replace it."""
     amplitude: Angle = 0.8726646259971648
     """Largest angle of a preset."""
     period: Annotated[Duration, Field(gt=0)] = 2.0
@@ -76,6 +76,22 @@ class Motion(Section):
     """The point that the head turns about [m]."""
     keyframes: Keyframes = ()
     """Poses at times; between them a smooth spline, held before the first and after the last."""
+    file: str | None = None
+    """A file of transforms, relative to the config: a row-major 4x4 matrix [m] a frame, as .csv (after a column "frame" or "time", or without) or .h5 (dataset "transforms")."""
+    unit_scale: Annotated[float, Field(gt=0)] = 1.0
+    """Metres per unit of the file's translations (0.01 for centimetres)."""
+    teleport: tuple[Annotated[int, Field(ge=2)], ...] = ()
+    """Frames at which the head jumps: hair is carried there as it is, with its velocity turned, and does not whip."""
+    teleport_beyond: Annotated[Length, Field(gt=0)] | None = None
+    """A pivot that moves further than this from one sample of the file to the next has jumped."""
+
+    @model_validator(mode="after")
+    def _one_motion(self) -> "Motion":
+        if self.file is not None and self.keyframes:
+            raise ValueError("a motion comes from keyframes or from a file; remove one of them")
+        if self.teleport and self.file is None and not self.keyframes:
+            raise ValueError("only keyframes and files jump; remove teleport")
+        return self
 
 
 class Simulate(Section):
@@ -109,3 +125,11 @@ class Simulate(Section):
     """Motion of the head."""
     tips: Keyframes = ()
     """Motion of pinned tips relative to the head, as keyframes."""
+    tips_file: str | None = None
+    """Motion of pinned tips relative to the head, as a file of transforms [m] (see motion.file)."""
+
+    @model_validator(mode="after")
+    def _one_motion_of_tips(self) -> "Simulate":
+        if self.tips and self.tips_file is not None:
+            raise ValueError("the motion of tips comes from tips or from tips_file; remove one of them")
+        return self
