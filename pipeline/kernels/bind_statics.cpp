@@ -20,10 +20,8 @@ static void check_held(const RestShape &rest) {
     }
 }
 
-static SagFree solve(const RestShape &rest, Vectors directors, Vectors load, Vectors normal, double margin,
-                     double max_factor) {
+static SagFree solve(const RestShape &rest, Vectors load, Vectors normal, double margin, double max_factor) {
     const size_t S = size_t(rest.S), P = size_t(rest.P);
-    require(directors.shape(0) == S && directors.shape(1) + 1 == P, "directors: expected (S, P-1, 3)");
     require(load.shape(0) == S && load.shape(1) == P, "load: expected (S, P, 3) of the rest shape");
     require(normal.shape(0) == S && normal.shape(1) == P, "normal: expected (S, P, 3) of the rest shape");
     require(margin >= 1, "margin: expected at least 1");
@@ -31,10 +29,11 @@ static SagFree solve(const RestShape &rest, Vectors directors, Vectors load, Vec
     auto positive = [](const std::vector<double> &values) {
         return std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
     };
-    require(positive(rest.bending) && positive(rest.twisting), "sag_free: bending and twisting must be positive");
+    require(positive(rest.bending) && positive(rest.bending_2) && positive(rest.twisting),
+            "sag_free: bending and twisting must be positive");
     check_held(rest);
     nb::gil_scoped_release release;
-    return sag_free({rest, directors.data(), load.data(), normal.data(), margin, max_factor}, threads());
+    return sag_free({rest, load.data(), normal.data(), margin, max_factor}, threads());
 }
 
 /// A view of one array of the result: columns beyond the first extent.
@@ -55,7 +54,7 @@ void bind_statics(nb::module_ &m) {
         .def_prop_ro("critical", &view<&SagFree::critical>)
         .def_prop_ro("needed", &view<&SagFree::needed>)
         .def_prop_ro("factor", &view<&SagFree::factor>);
-    m.def("sag_free", &solve, nb::arg("rest"), nb::arg("directors"), nb::arg("load"), nb::arg("normal"),
+    m.def("sag_free", &solve, nb::arg("rest"), nb::arg("load"), nb::arg("normal"),
           nb::arg("margin"), nb::arg("max_factor"));
 }
 

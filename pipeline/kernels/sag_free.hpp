@@ -18,9 +18,8 @@ inline constexpr double kMostChange = 1.5707963267948966; // [rad] of a rest str
 /// What the balance of a groom is made from; arrays of the caller.
 struct Groom {
     const RestShape &rest;
-    const double *directors; // (S, P-1, 3)
-    const double *load;      // (S, P, 3) [N] in the head's rest frame: gravity and whatever else pulls
-    const double *normal;    // (S, P, 3) of the head where it supports a point, 0 elsewhere
+    const double *load;   // (S, P, 3) [N] in the head's rest frame: gravity and whatever else pulls
+    const double *normal; // (S, P, 3) of the head where it supports a point, 0 elsewhere
     double margin, max_factor;
 };
 
@@ -86,12 +85,12 @@ class SagFreeBlock {
     void read(const Groom &groom, const BlockIndex<double> &index) {
         const int P = block_.P;
         gather(block_.x, groom.rest.points.data(), P, index.strand);
-        gather(block_.director, groom.directors, P - 1, index.strand);
+        gather(block_.director, groom.rest.directors.data(), P - 1, index.strand);
         gather(gravity_, groom.load, P, index.strand);
         gather(normal_, groom.normal, P, index.strand);
         gather<double>(block_.l, groom.rest.length.data(), P - 1, P - 1, index.strand);
         gather<double>(&block_.B[0], groom.rest.bending.data(), 1, 1, index.strand);
-        block_.B[1] = block_.B[0];
+        gather<double>(&block_.B[1], groom.rest.bending_2.data(), 1, 1, index.strand);
         gather<double>(&block_.B[2], groom.rest.twisting.data(), 1, 1, index.strand);
         for (int i = 0; i < P; ++i) {
             block_.F[i] = gravity_[i], stability_.n[i] = Vector{}, reaction_[i] = Many{};

@@ -19,7 +19,7 @@
 namespace ringlet {
 
 inline constexpr double kLeastFactor = 1e-4, kMostFactor = 1e4; // range of the bisection
-inline constexpr int kTries = 16;                               // narrows it to 0.03 %
+inline constexpr int kTries = 20;                               // narrows it to 2e-5
 inline constexpr double kSpring = 1e3;                          // rho, in max(B) / dl^3
 
 struct Stability {

@@ -8,16 +8,13 @@
 //     [g_1 g_2 g_3] s = M_i,  u_r = u - dl s / (B f)            B = (B1, B2, C), f a factor on the stiffness
 // Notation: t, m tangent and director of a segment, joint i between segments i-1 and i; u = (k_1, k_2, twist)
 // integrated strains; g_a gradient of strain a when the outer segment turns (the inner one feels the opposite);
-// b_1, b_2 the mid frame carried to the outer segment, in which
+// b_1, b_2 the mid frame carried to the outer segment (see kirchhoff.hpp), in which with t
 //     g_1 = (-k1 k2 / 4, 1 + k1^2 / 4, k2 / 2), g_2 = (-1 - k2^2 / 4, k1 k2 / 4, -k1 / 2), g_3 = (-k1 / 2, -k2 / 2, 1)
-// test_strain_gradients_agree_with_complex_step proves these against the strains.
+// test_the_groom_is_in_equilibrium proves them: the force of the energy, which is tested by complex steps, balances.
 #pragma once
 
-#include "block.hpp"
+#include "kirchhoff.hpp"
 #include "matrix3.hpp"
-
-#include <algorithm>
-#include <cmath>
 
 namespace ringlet {
 
@@ -27,41 +24,26 @@ using Matrix = Mat3<double>;
 
 /// A joint as it is groomed.
 struct StaticJoint {
-    Vector b1, b2, t;          // mid frame on the outer segment, and its tangent
-    Many k1, k2, twist;
-    Vector g[3];               // gradients of the three strains
-    Vector dual[3];            // s_a = dual_a . M
-    Many s[3];                 // what the joint supplies [N m]
-    Many dl, live;             // dl; 1 where the outer segment can turn
-};
+    Many k1, k2, twist;  // strains
+    Vector b1, b2, t;    // mid frame on the outer segment, and its tangent
+    Vector g[3];         // gradients of the three strains
+    Vector dual[3];      // s_a = dual_a . M
+    Many s[3];           // what the joint supplies [N m]
+    Many dl, live;       // mean length of both segments; 1 where the outer segment can turn
 
-/// The mid frame and the strains of a joint.
-inline StaticJoint joint_between(Vector t0, Vector m0, Vector t1, Vector m1) {
-    StaticJoint joint;
-    Vector n0 = cross(t0, m0), n1 = cross(t1, m1);
-    Many q = maximum<double>(1 + dot(t0, t1), splat(1e-6));
-    Many A = (dot(m0, m1) + dot(n0, n1)) / q, S = (dot(n0, m1) - dot(m0, n1)) / q, c, s;
-    for (int lane = 0; lane < kLanes<double>; ++lane) {
-        double twist = std::atan2(S[lane], A[lane]);
-        joint.twist[lane] = twist, c[lane] = std::cos(0.5 * twist), s[lane] = std::sin(0.5 * twist);
+    StaticJoint() = default;
+
+    StaticJoint(Vector t0, Vector t1, Vector m0, Vector m1) : t(t1) {
+        const Joint<double> joint(t0, t1, m0, m1, splat(0.0));
+        k1 = joint.k1, k2 = joint.k2, twist = joint.twist;
+        b1 = joint.a1 - (0.5 * k1) * (t0 + t1), b2 = joint.a2 - (0.5 * k2) * (t0 + t1);
+        g[0] = (-0.25 * k1 * k2) * b1 + (1 + 0.25 * k1 * k1) * b2 + (0.5 * k2) * t;
+        g[1] = (-1 - 0.25 * k2 * k2) * b1 + (0.25 * k1 * k2) * b2 - (0.5 * k1) * t;
+        g[2] = t - (0.5 * k1) * b1 - (0.5 * k2) * b2;
+        const Many inverse = 1 / dot(g[0], cross(g[1], g[2]));
+        for (int a = 0; a < 3; ++a) dual[a] = inverse * cross(g[(a + 1) % 3], g[(a + 2) % 3]);
     }
-    Vector a1 = c * m0 + s * n0, a2 = c * n0 - s * m0;
-    joint.k1 = 2 * dot(a1, t1) / q, joint.k2 = 2 * dot(a2, t1) / q;
-    joint.b1 = a1 - (0.5 * joint.k1) * (t0 + t1), joint.b2 = a2 - (0.5 * joint.k2) * (t0 + t1);
-    joint.t = t1;
-    return joint;
-}
-
-/// The gradients of the strains, and their dual basis.
-inline void differentiate(StaticJoint &joint) {
-    const Many k1 = joint.k1, k2 = joint.k2;
-    const Vector b1 = joint.b1, b2 = joint.b2, t = joint.t;
-    joint.g[0] = (-0.25 * k1 * k2) * b1 + (1 + 0.25 * k1 * k1) * b2 + (0.5 * k2) * t;
-    joint.g[1] = (-1 - 0.25 * k2 * k2) * b1 + (0.25 * k1 * k2) * b2 - (0.5 * k1) * t;
-    joint.g[2] = t - (0.5 * k1) * b1 - (0.5 * k2) * b2;
-    Many inverse = 1 / dot(joint.g[0], cross(joint.g[1], joint.g[2]));
-    for (int a = 0; a < 3; ++a) joint.dual[a] = inverse * cross(joint.g[(a + 1) % 3], joint.g[(a + 2) % 3]);
-}
+};
 
 /// A block of strands at the groomed points.
 struct StaticBlock {
@@ -79,14 +61,13 @@ struct StaticBlock {
     /// Tangents and joints, from points, directors and what is held.
     void set_joints() {
         for (int j = 0; j < P - 1; ++j) {
-            Vector edge = x[j + 1] - x[j];
-            t[j] = (1 / l[j]) * edge;
+            const Vector edge = x[j + 1] - x[j];
+            t[j] = (1 / square_root<double>(dot(edge, edge))) * edge;
         }
         for (int i = 1; i < P - 1; ++i) {
-            joint[i] = joint_between(t[i - 1], director[i - 1], t[i], director[i]);
+            joint[i] = StaticJoint(t[i - 1], t[i], director[i - 1], director[i]);
             joint[i].dl = 0.5 * (l[i - 1] + l[i]);
             joint[i].live = turns[i];
-            differentiate(joint[i]);
         }
     }
 
