@@ -305,7 +305,9 @@ class SagFree:
     factor: _F64
     """(S,): factor that is given, no more than max_factor."""
 
-def sag_free(rest: RestShape, load: _F64, normal: _F64, margin: float, max_factor: float) -> SagFree:
+def sag_free(
+    rest: RestShape, load: _F64, normal: _F64, margin: float, max_factor: float, lean_above: float
+) -> SagFree:
     """Rest strains with which `rest.points` are an equilibrium of "kirchhoff" strands under a load, and its stability.
 
     The equilibrium is exact for any strand (statics.hpp). It is stable with the stiffness times `critical`
@@ -314,10 +316,10 @@ def sag_free(rest: RestShape, load: _F64, normal: _F64, margin: float, max_facto
     Args:
         rest: clamped strands: at least two points held at the root, none beyond; nothing is written to it.
         load: (S, P, 3) float64 [N], forces on the points in the head's rest frame, weight included.
-        normal: (S, P, 3) float64, unit normal of the head where it supports a point, 0 elsewhere. Reactions are
-            used for strands that would need stiffening without, or that lie on the head with a quarter of their points.
+        normal: (S, P, 3) float64, unit normal of the head where it can support a point, 0 elsewhere.
         margin: at least 1.
         max_factor: at least 1.
+        lean_above: at least 1; strands that need more than this lean on the head, where that halves what they need.
 
     Raises:
         ValueError: shapes that do not fit, strands without stiffness, strands that are not clamped at the root alone.

@@ -20,12 +20,14 @@ static void check_held(const RestShape &rest) {
     }
 }
 
-static SagFree solve(const RestShape &rest, Vectors load, Vectors normal, double margin, double max_factor) {
+static SagFree solve(const RestShape &rest, Vectors load, Vectors normal, double margin, double max_factor,
+                     double lean_above) {
     const size_t S = size_t(rest.S), P = size_t(rest.P);
     require(load.shape(0) == S && load.shape(1) == P, "load: expected (S, P, 3) of the rest shape");
     require(normal.shape(0) == S && normal.shape(1) == P, "normal: expected (S, P, 3) of the rest shape");
     require(margin >= 1, "margin: expected at least 1");
     require(max_factor >= 1, "max_factor: expected at least 1");
+    require(lean_above >= 1, "lean_above: expected at least 1");
     auto positive = [](const std::vector<double> &values) {
         return std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
     };
@@ -33,7 +35,7 @@ static SagFree solve(const RestShape &rest, Vectors load, Vectors normal, double
             "sag_free: bending and twisting must be positive");
     check_held(rest);
     nb::gil_scoped_release release;
-    return sag_free({rest, load.data(), normal.data(), margin, max_factor}, threads());
+    return sag_free({rest, load.data(), normal.data(), margin, max_factor, lean_above}, threads());
 }
 
 /// A view of one array of the result: columns beyond the first extent.
@@ -55,7 +57,7 @@ void bind_statics(nb::module_ &m) {
         .def_prop_ro("needed", &view<&SagFree::needed>)
         .def_prop_ro("factor", &view<&SagFree::factor>);
     m.def("sag_free", &solve, nb::arg("rest"), nb::arg("load"), nb::arg("normal"),
-          nb::arg("margin"), nb::arg("max_factor"));
+          nb::arg("margin"), nb::arg("max_factor"), nb::arg("lean_above"));
 }
 
 } // namespace ringlet

@@ -85,6 +85,10 @@ class NonNegative {
     }
 };
 
+/// The head yields a little, in units of the strand's compliance L^3 / (3 B1): beside the clamp a point could carry
+/// hundreds of weights for next to nothing, and the least give there would turn the whole strand.
+inline constexpr double kYield = 1e-3;
+
 /// The reactions of one lane of a block in balance: `r[k]` at the points whose normal n[k] is not zero.
 class Reactions {
   public:
@@ -113,13 +117,23 @@ class Reactions {
                 }
             }
         }
-        for (int k = 0; k < n; ++k)
+        const double yield = kYield * std::pow(reach(), 3) / (3 * block_.B[0][lane_]);
+        for (int k = 0; k < n; ++k) {
+            Q[k * n + k] += yield;
             for (int j = 0; j < k; ++j) Q[j * n + k] = Q[k * n + j];
+        }
         const std::vector<double> found = NonNegative(std::move(Q), std::move(c)).solve();
         for (int k = 0; k < n; ++k) r[points_[k]][lane_] = found[k];
     }
 
   private:
+    /// Length of the strand.
+    double reach() const {
+        double length = 0;
+        for (int j = 0; j < block_.P - 1; ++j) length += block_.turns[j][lane_] * block_.l[j][lane_];
+        return length;
+    }
+
     const StaticBlock &block_;
     int lane_;
     std::vector<int> points_;

@@ -2,7 +2,9 @@
 //
 // Strands are stiffened by f = max(1, margin x critical factor), no more than max_factor, and so that no rest strain
 // changes by more than a quarter turn: past half a turn a twist wraps round, and the joint would hold nothing.
-// Reactions are used where they are needed: where gravity alone needs stiffening, or where a strand lies on the head.
+// A strand that needs more than lean_above leans on the head where that at least halves what it needs. The others do
+// not: leaning hair slides when the head moves, and friction keeps it where it slid to, while hair that holds itself
+// comes back (test_leaning_strands_are_at_rest measures both).
 #pragma once
 
 #include "reactions.hpp"
@@ -12,15 +14,15 @@
 
 namespace ringlet {
 
-inline constexpr double kLies = 0.25;         // part of a strand's points that are supported
 inline constexpr double kMostChange = 1.5707963267948966; // [rad] of a rest strain
+inline constexpr double kWorthLeaning = 0.5;              // a strand leans if that leaves this part of its factor
 
 /// What the balance of a groom is made from; arrays of the caller.
 struct Groom {
     const RestShape &rest;
     const double *load;   // (S, P, 3) [N] in the head's rest frame: gravity and whatever else pulls
     const double *normal; // (S, P, 3) of the head where it supports a point, 0 elsewhere
-    double margin, max_factor;
+    double margin, max_factor, lean_above;
 };
 
 struct SagFree {
@@ -48,17 +50,9 @@ class SagFreeBlock {
         const int P = block_.P;
         read(groom, index);
         block_.set_joints();
-        block_.balance();
-        stability_.set(block_);
-        Many critical = stability_.critical();
-        if (support(groom.margin, critical, index)) {
-            block_.balance();
-            stability_.set(block_);
-            critical = stability_.critical();
-        }
-        const Many one = splat(1.0);
-        Many needed = maximum<double>(groom.margin * critical, block_.largest_change() / kMostChange);
-        needed = maximum<double>(needed, one);
+        Many critical, needed;
+        balance(groom.margin, critical, needed);
+        lean(groom, index, critical, needed);
         Many factor = minimum<double>(needed, splat(groom.max_factor));
         for (int i = 1; i < P - 1; ++i) {
             const StaticJoint &joint = block_.joint[i];
@@ -102,22 +96,42 @@ class SagFreeBlock {
         }
     }
 
-    /// Adds the reactions of the lanes that need them to the loads; false when there are none.
-    bool support(double margin, Many critical, const BlockIndex<double> &index) {
-        bool used = false;
+    /// Balances the loads; the critical factor, and the one that is needed.
+    void balance(double margin, Many &critical, Many &needed) {
+        block_.balance();
+        stability_.set(block_);
+        critical = stability_.critical();
+        needed = maximum<double>(margin * critical, block_.largest_change() / kMostChange);
+        needed = maximum<double>(needed, splat(1.0));
+    }
+
+    /// Lets the lanes that need much lean on the head, and keeps that where it helps.
+    void lean(const Groom &groom, const BlockIndex<double> &index, Many &critical, Many &needed) {
+        bool leans = false;
         for (int lane = 0; lane < index.count; ++lane) {
-            Reactions reactions(block_, normal_, lane);
-            const int count = reactions.count();
-            if (count == 0 || !(margin * critical[lane] > 1 || count > kLies * block_.P)) continue;
+            if (!(needed[lane] > groom.lean_above)) continue;
+            const Reactions reactions(block_, normal_, lane);
+            leans = leans || reactions.count() > 0;
             reactions.solve(reaction_);
-            used = true;
         }
-        for (int k = 0; used && k < block_.P; ++k) {
-            Mask<double> on = reaction_[k] > splat(0.0);
+        if (!leans) return;
+        load();
+        Many leaning_critical, leaning_needed;
+        balance(groom.margin, leaning_critical, leaning_needed);
+        const Mask<double> helps = leaning_needed < kWorthLeaning * needed;
+        critical = select<double>(helps, leaning_critical, critical);
+        needed = select<double>(helps, leaning_needed, needed);
+        for (int k = 0; k < block_.P; ++k) reaction_[k] = select<double>(helps, reaction_[k], Many{});
+        load();
+        block_.balance();
+    }
+
+    /// Gravity and reactions; the head holds the points that have some.
+    void load() {
+        for (int k = 0; k < block_.P; ++k) {
             block_.F[k] = gravity_[k] + reaction_[k] * normal_[k];
-            stability_.n[k] = select(on, normal_[k], Vector{});
+            stability_.n[k] = select(reaction_[k] > splat(0.0), normal_[k], Vector{});
         }
-        return used;
     }
 };
 

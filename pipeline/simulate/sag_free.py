@@ -1,9 +1,9 @@
 """Sag-free start: a rest shape that holds the groomed guides under gravity, instead of the groom itself.
 
 Hair was groomed as it hangs, so its rest shape is another one. The kernel finds it exactly, and how much stiffer a guide
-has to be for the groom to be stable (statics.hpp, stability.hpp). It holds at the head's first pose, without wind and
-without hair on hair; where the head carries a guide, its contact offset becomes the groomed distance, so that the two
-start in touch. Points groomed below the skin come out of it, and move their guides.
+has to be for the groom to be stable (statics.hpp, stability.hpp, sag_free.hpp). It holds at the head's first pose,
+without wind and without hair on hair. Where a guide leans on the head, its contact offset becomes the groomed distance,
+so that the two start in touch. Points groomed below the skin come out of it, and move their guides.
 """
 
 from dataclasses import asdict, dataclass
@@ -35,7 +35,7 @@ class Report:
     """How much stiffer, at most."""
     over_max_factor: int
     """Guides that would have to be stiffer than sag_free.max_factor allows: they will sag."""
-    carried: int
+    leaning: int
     """Guides of which the head carries a part."""
     below_skin: int
     """Guides with points groomed below the skin."""
@@ -44,7 +44,7 @@ class Report:
         """The report in words."""
         parts = [
             f"sag-free: net force at most {self.residual:.1e} point weights, "
-            f"{self.carried} of {self.guides} guides rest on the head",
+            f"{self.leaning} of {self.guides} guides lean on the head",
             f"sag-free: {self.stiffened} guides stiffened, by {self.largest_factor:.3g} at most",
         ]
         if self.over_max_factor:
@@ -69,7 +69,7 @@ class Start:
     tension: _Vectors
     """(G, P-1) [N]."""
     contact: NDArray[np.uint8]
-    """(G, P): 1 where the head carries the point."""
+    """(G, P): 1 where the guide leans on the head."""
     report: Report
 
 
@@ -94,7 +94,7 @@ def hold_groom(
     supported = free & outside & (distance <= np.maximum(_NEAR, offset + _ABOVE))
     normal = np.where(supported[..., None], normal, 0.0)
 
-    found = kernels.sag_free(rest, load, normal, options.margin, options.max_factor)
+    found = kernels.sag_free(rest, load, normal, options.margin, options.max_factor, options.lean_above)
     carried = found.reaction > 0
     rest.offset = np.where(carried, distance, offset)
     rest.strain = found.strain
@@ -107,7 +107,7 @@ def hold_groom(
         stiffened=int((found.factor > 1).sum()),
         largest_factor=float(found.factor.max(initial=1.0)),
         over_max_factor=int((found.needed > found.factor).sum()),
-        carried=int(carried.any(axis=1).sum()),
+        leaning=int(carried.any(axis=1).sum()),
         below_skin=int((free & ~outside).any(axis=1).sum()),
     )
     return Start(found.tension.copy(), carried.astype(np.uint8), report)

@@ -41,8 +41,8 @@ def balance(
     margin: float = 1.5,
     most: float = 50.0,
 ) -> kernels.SagFree:
-    """The statics of a rest shape; the head supports no point unless told."""
-    return kernels.sag_free(rest, load, np.zeros_like(load) if normal is None else normal, margin, most)
+    """The statics of a rest shape; the head supports no point unless told, and then all strands that need it."""
+    return kernels.sag_free(rest, load, np.zeros_like(load) if normal is None else normal, margin, most, 1.0)
 
 
 def residual(
@@ -213,7 +213,7 @@ def lying(count: int = 32) -> tuple[kernels.RestShape, Points]:
 
 
 def test_reactions_change_the_rest_shape_least() -> None:
-    """They are the non-negative least squares of the bending and twisting that gravity leaves to the rest shape."""
+    """Non-negative least squares of what gravity leaves to the rest shape, and of the head's yield (1e-3 L^3 / 3B)."""
     rest, normal = lying()
     load = weight(rest)
     found = balance(rest, load, normal)
@@ -232,7 +232,9 @@ def test_reactions_change_the_rest_shape_least() -> None:
         force = np.zeros_like(load)
         force[0, k] = 1e-7 * normal[0, k]
         columns.append(change(force) / 1e-7)
-    expected, _ = nnls(np.array(columns).T, -change(load))
+    give = np.sqrt(1e-3 * rest.length[0, 1:].sum() ** 3 / (3 * BENDING)) * np.eye(len(supported))
+    wanted = np.concatenate([-change(load), np.zeros(len(supported))])
+    expected, _ = nnls(np.concatenate([np.array(columns).T, give]), wanted)
     carried = found.reaction.sum() / -load[0, 2:, 1].sum()
     print(
         f"{(found.reaction > 0).sum()} of {len(supported)} points carry {100 * carried:.0f} % of the weight"

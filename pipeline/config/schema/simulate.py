@@ -89,6 +89,8 @@ class SagFree(Section):
     """How much stiffer than the least that is stable a guide is made, where its material is not."""
     max_factor: Annotated[float, Field(ge=1)] = 50.0
     """No guide is made stiffer than its material by more than this; those that would have to be are reported, and sag."""
+    lean_above: Annotated[float, Field(ge=1)] = 4.0
+    """Guides that would have to be stiffened by more than this lean on the head, where that helps; leaning hair slides."""
 
 
 class Simulate(Section):
