@@ -289,6 +289,43 @@ def relax(
     Held points stay; the free ones move as little as their masses ask for, so that their momentum is conserved.
     """
 
+class SagFree:
+    """What `sag_free` finds: rest strains, the forces that go with them, and how much stiffness that takes."""
+
+    strain: _F64
+    """(S, P-2, 3): rest strains (k1, k2, twist), for `RestShape.strain`, with the stiffness times `factor`."""
+    tension: _F64
+    """(S, P-1) [N]: of the segments; 0 between held points."""
+    reaction: _F64
+    """(S, P) [N]: what the head carries of each point, along its normal; 0 where none was asked for."""
+    critical: _F64
+    """(S,): smallest factor on the true stiffness at which the groom is stable; 1e-4 stands for any smaller one."""
+    needed: _F64
+    """(S,): factor that is asked for, at least 1."""
+    factor: _F64
+    """(S,): factor that is given, no more than max_factor."""
+
+def sag_free(
+    rest: RestShape, load: _F64, normal: _F64, margin: float, max_factor: float, lean_above: float
+) -> SagFree:
+    """Rest strains with which `rest.points` are an equilibrium of "kirchhoff" strands under a load, and its stability.
+
+    The equilibrium is exact for any strand (statics.hpp). It is stable with the stiffness times `critical`
+    (stability.hpp), and is given `margin` times that where this is more than 1.
+
+    Args:
+        rest: clamped strands: at least two points held at the root, none beyond; nothing is written to it.
+        load: (S, P, 3) float64 [N], forces on the points in the head's rest frame, weight included.
+        normal: (S, P, 3) float64, unit normal of the head where it can support a point, 0 elsewhere.
+        margin: at least 1.
+        max_factor: at least 1.
+        lean_above: at least 1; strands that need more than this lean on the head, where that halves what they need.
+
+    Raises:
+        ValueError: shapes that do not fit, strands without stiffness, strands that are not clamped at the root alone.
+
+    """
+
 # --- expansion: strands from guides (expand.hpp) -----------------------------------------------------
 
 class BoundStrands:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from pipeline.cache.expansion import distance_field
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.simulate.plots import draw_energies
+from pipeline.simulate.sag_free import tip_drift
 from pipeline.simulate.stepper import Guides, Simulation, SimulationDiverged
 
 CHECKPOINT_FRAMES = 8
@@ -35,7 +37,8 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
         _keep(simulation, kept, key)
         detail = f" (strand {strand[error.guide]} of the groom; its state is in {kept})"
         raise SimulationDiverged(error.guide, error.frame, detail) from error
-    segments.merge(provenance(config, "simulate"), config.simulate.fps)
+    record = {"sag_free": _sag_free(simulation, segments, guides)} if simulation.sag_free else {}
+    segments.merge(provenance(config, "simulate") | record, config.simulate.fps)
     with cache.open_guides(experiment.guides) as written:
         draw_energies(experiment.folder / "energy.png", written.diagnostics, written.fps)
 
@@ -77,6 +80,21 @@ def _fill(segments: cache.Segments, simulation: Simulation) -> None:
             if len(frames) == CHECKPOINT_FRAMES or index == simulation.simulate.frames:
                 segments.append(frames, simulation.save())
                 frames = []
+
+
+def _sag_free(simulation: Simulation, segments: cache.Segments, guides: Guides) -> dict[str, Any]:
+    """What it took to hold the groom, and how far the tips have drifted from it at the first frame."""
+    first = next(segments.frames())
+    drift = float(tip_drift(guides.points, first.points, first.pose).max(initial=0.0))
+    report = simulation.sag_free
+    assert report is not None
+    for line in report.lines():
+        say("simulate", line)
+    say(
+        "simulate",
+        f"sag-free: after {simulation.simulate.settle:g} s tips are off by {100 * drift:.2g} % of length",
+    )
+    return report.record() | {"drift": drift, "drift_after_s": simulation.simulate.settle}
 
 
 def _keep(simulation: Simulation, path: Path, key: str) -> None:

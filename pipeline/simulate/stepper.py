@@ -13,6 +13,7 @@ from pipeline.config.schema import Simulate
 from pipeline.errors import InputError
 from pipeline.simulate.motion import hand_motion, head_motion
 from pipeline.simulate.rest import rest_shape, settling, step_settings
+from pipeline.simulate.sag_free import Report, hold_groom
 from pipeline.simulate.screws import Pose, inverse, place
 from pipeline.simulate.wind import wind
 from pipeline.strands.held import HAND
@@ -69,6 +70,7 @@ class Simulation:
         self.hand = hand_motion(simulate, _middle_of_held(guides))
         self.wind = wind(simulate.air, seed)
         self.step = 0
+        self.sag_free: Report | None = None
         self.state = self._first_state(guides.points)
         self._diagnostics = _summary(None)
 
@@ -143,9 +145,14 @@ class Simulation:
         pose, precision = self.head(0.0), np.dtype(self.simulate.precision)
         moved = place(pose, points.astype(np.float64))
         directors = self.rest.directors @ pose[:3, :3].T
-        return kernels.at_rest(
+        state = kernels.at_rest(
             np.ascontiguousarray(moved, precision), np.ascontiguousarray(directors, precision)
         )
+        if self.simulate.rest == "sag_free":
+            start = hold_groom(self.rest, self.field, self.simulate.gravity, pose, self.simulate.sag_free)
+            state.tension[:], state.contact[:] = start.tension, start.contact
+            self.sag_free = start.report
+        return state
 
 
 def _summary(report: kernels.Report | None) -> dict[str, float]:

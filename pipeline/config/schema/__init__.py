@@ -12,7 +12,7 @@ from pipeline.config.schema.groom import Clump, Curl, Cut, Frizz, Groom, Parting
 from pipeline.config.schema.interpolate import Interpolate, Variation
 from pipeline.config.schema.render import Fibre, Render
 from pipeline.config.schema.scene import Camera, Light, Scene
-from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, Simulate
+from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, SagFree, Simulate
 
 __all__ = [
     "Air",
@@ -34,6 +34,7 @@ __all__ = [
     "Parting",
     "Path",
     "Render",
+    "SagFree",
     "Scene",
     "Section",
     "Simulate",

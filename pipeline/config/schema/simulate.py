@@ -3,7 +3,7 @@
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from pipeline.config.schema.base import Position, Section, Velocity
 from pipeline.config.units import Acceleration, Angle, Density, Duration, Length, Pressure, Rate, Speed
@@ -60,6 +60,12 @@ def _ascending(frames: tuple[Keyframe, ...]) -> tuple[Keyframe, ...]:
     return frames
 
 
+_CANNOT_HOLD = {
+    "none": "without torsion nothing holds a curl sideways",
+    "frenet": "curvature and torsion alone cannot hold a straight part sideways, nor a strand from turning about its root",
+    "rotor": "curvature and torsion alone cannot hold a straight part sideways, nor a strand from turning about its root",
+}
+
 Keyframes = Annotated[tuple[Keyframe, ...], AfterValidator(_ascending)]
 
 
@@ -94,6 +100,15 @@ class Motion(Section):
         return self
 
 
+class SagFree(Section):
+    margin: Annotated[float, Field(ge=1)] = 1.5
+    """How much stiffer than the least that is stable a guide is made, where its material is not."""
+    max_factor: Annotated[float, Field(ge=1)] = 50.0
+    """No guide is made stiffer than its material by more than this; those that would have to be are reported, and sag."""
+    lean_above: Annotated[float, Field(ge=1)] = 4.0
+    """Guides that would have to be stiffened by more than this lean on the head, where that helps; leaning hair slides."""
+
+
 class Simulate(Section):
     frames: Annotated[int, Field(ge=1, le=1_000_000)] = 72
     """Number of frames."""
@@ -109,6 +124,10 @@ class Simulate(Section):
     """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond."""
     torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "rotor"
     """Torsion model: "kirchhoff" (material frames), "rotor" (4-point), "frenet" (the lecture's, regularised) or "none"."""
+    rest: Literal["groom", "sag_free"] = "groom"
+    """Rest shape: the "groom" itself, which then sags under gravity, or "sag_free", one that holds the groom (torsion "kirchhoff")."""
+    sag_free: SagFree = SagFree()
+    """How stable a sag-free groom is made."""
     relaxation: Literal["newton", "sweep"] = "newton"
     """Length relaxation: "newton" (tridiagonal, 2 iterations) or the lecture's "sweep" (hundreds)."""
     tolerance: Annotated[float, Field(gt=0, le=0.1)] = 1e-4
@@ -133,3 +152,11 @@ class Simulate(Section):
         if self.tips and self.tips_file is not None:
             raise ValueError("the motion of tips comes from tips or from tips_file; remove one of them")
         return self
+
+    @field_validator("rest")
+    @classmethod
+    def _torsion_holds_it(cls, rest: str, info: ValidationInfo) -> str:
+        torsion = info.data.get("torsion", "kirchhoff")
+        if rest == "sag_free" and torsion != "kirchhoff":
+            raise ValueError(f'"sag_free" needs simulate.torsion = "kirchhoff": {_CANNOT_HOLD[torsion]}')
+        return rest
