@@ -60,6 +60,7 @@ def read_guides(experiment: cache.Experiment) -> tuple[Guides, NDArray[np.uint32
             held=groom["strands/held"][strand],
             offset=groom["guides/offset"][:],
             field=distance_field(groom),
+            strands=len(groom["strands/points"]),
         )
     return guides, strand
 
@@ -80,6 +81,8 @@ def _fill(segments: cache.Segments, simulation: Simulation) -> None:
             if len(frames) == CHECKPOINT_FRAMES or index == simulation.simulate.frames:
                 segments.append(frames, simulation.save())
                 frames = []
+    if simulation.neighbours is not None:
+        say("simulate", simulation.cost.line(simulation.simulate.hair_contact.method))
 
 
 def _sag_free(simulation: Simulation, segments: cache.Segments, guides: Guides) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from pipeline import kernels
 from pipeline.cache import Frame
 from pipeline.config.schema import Simulate
 from pipeline.errors import InputError
+from pipeline.simulate.hair_contact import Cost, neighbours
 from pipeline.simulate.motion import hand_motion, head_motion
 from pipeline.simulate.rest import rest_shape, settling, step_settings
 from pipeline.simulate.sag_free import Report, hold_groom
@@ -48,6 +49,8 @@ class Guides:
     """(G, P) [m]: distance that points keep from the head."""
     field: kernels.DistanceField | None = None
     """Distance to the head; None without one."""
+    strands: int = 0
+    """Strands of the groom that they stand for; 0 for no more than themselves."""
 
 
 class Simulation:
@@ -68,6 +71,9 @@ class Simulation:
         self.settings = step_settings(simulate)
         self.head = head_motion(simulate.motion, simulate.fps)
         self.hand = hand_motion(simulate, _middle_of_held(guides))
+        each = max(guides.strands, len(guides.points)) / len(guides.points)
+        self.neighbours = neighbours(simulate.hair_contact, self.rest, each)
+        self.cost = Cost()
         self.wind = wind(simulate.air, seed)
         self.step = 0
         self.sag_free: Report | None = None
@@ -116,7 +122,8 @@ class Simulation:
         hands = [pose @ self.hand(self._time(i)) for i, pose in enumerate(heads)]
         winds = [self.wind(self._time(i + 0.5)) for i in range(count)]
         drive = kernels.Drive(np.array(heads), np.array(winds), np.array(hands))
-        report = kernels.advance(self.state, self.rest, self.field, drive, settings)
+        report = kernels.advance(self.state, self.rest, self.field, drive, settings, self.neighbours)
+        self.cost.add(count, report)
         self.step += count
         self._diagnostics = _summary(report)
         self.check()

@@ -119,7 +119,9 @@ def test_rest_shape_has_no_force_and_no_twist(curl: Points, circle: Points, stra
     rest = shape(np.stack([curl, circle, straight]))
     force, turning = kernels.kirchhoff(rest.points, rest.directors, rest)[1:]
     scale = BENDING / rest.length.mean() ** 2
-    print(f"rest force over B/dl^2 {np.abs(force).max() / scale:.1e}, rest twist {rest.strain[..., 2].max():.1e}")
+    print(
+        f"rest force over B/dl^2 {np.abs(force).max() / scale:.1e}, rest twist {rest.strain[..., 2].max():.1e}"
+    )
     assert np.abs(force).max() <= 1e-13 * scale
     assert np.abs(turning).max() <= 1e-13 * BENDING / rest.length.mean()
     assert np.abs(rest.strain[..., 2]).max() <= 1e-14

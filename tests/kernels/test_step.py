@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from strand_scenes import (
     FREE,
     STILL,
+    copy,
     drive,
     hairy_sphere,
     roots,
     rotation,
+    same,
     settings,
     shake,
     shape,
@@ -25,7 +27,6 @@ from pipeline import kernels
 
 Points = NDArray[np.float64]
 every_model = pytest.mark.parametrize("torsion", ["kirchhoff", "rotor"])
-ARRAYS = ("points", "velocity", "tension", "contact", "directors", "twist")
 
 
 @pytest.fixture(autouse=True)
@@ -34,15 +35,6 @@ def _threads() -> Iterator[None]:
     count = kernels.threads()
     yield
     kernels.set_threads(count)
-
-
-def copy(state: kernels.State) -> kernels.State:
-    return kernels.State(*(getattr(state, name).copy() for name in ARRAYS))
-
-
-def same(a: kernels.State, b: kernels.State) -> bool:
-    """Whether two states are equal to the last bit."""
-    return all(getattr(a, name).tobytes() == getattr(b, name).tobytes() for name in ARRAYS)
 
 
 def curly_head(count: int, precision: type = np.float32) -> tuple[kernels.RestShape, kernels.State]:
