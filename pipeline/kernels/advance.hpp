@@ -30,6 +30,7 @@ struct Report {
     int rounds_max = 0;
     long halvings = 0;
     int bad_strand = -1;
+    double seconds = 0, neighbour_seconds = 0; // wall time of the call, and of hair-hair contact in it
 };
 
 template <class Real>

@@ -1,7 +1,7 @@
 // Python's view of the step: state, distance field, drive, settings, `advance` and its report.
 #include "bindings.hpp"
 
-#include "advance.hpp"
+#include "together.hpp"
 
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -128,13 +128,48 @@ static void check_fits(const State &state, const RestShape &rest) {
             "state and rest shape have different numbers of strands or points");
 }
 
+template <class Real>
+static Report advance_as(const State &state, const RestShape &rest, const DistanceField *field, const Drive &drive,
+                         const StepSettings &settings, const Neighbours *neighbours) {
+    if (!neighbours) return advance(state.arrays<Real>(), rest, field, drive, settings, threads());
+    Together<Real> strands(state.arrays<Real>(), rest, drive, settings);
+    return strands.advance(field, *neighbours->start(Real()), threads());
+}
+
 static Report advance_state(State &state, const RestShape &rest, const DistanceField *field, const Drive &drive,
-                            const StepSettings &settings) {
+                            const StepSettings &settings, const Neighbours *neighbours) {
     check_fits(state, rest);
     check_settings(settings);
+    require(!neighbours || neighbours->fits(rest.S, rest.P), "neighbours: made for another rest shape");
     nb::gil_scoped_release release;
-    if (state.single()) return advance(state.arrays<float>(), rest, field, drive, settings, threads());
-    return advance(state.arrays<double>(), rest, field, drive, settings, threads());
+    double seconds = 0;
+    Report report;
+    {
+        const Clock clock(seconds);
+        report = state.single() ? advance_as<float>(state, rest, field, drive, settings, neighbours)
+                                : advance_as<double>(state, rest, field, drive, settings, neighbours);
+    }
+    report.seconds = seconds;
+    return report;
+}
+
+template <class Real>
+static Doubles neighbour_acceleration_as(const State &state, const RestShape &rest, const Neighbours &neighbours,
+                                         const Pose &head, double theta_dt) {
+    auto values = new_array<double>({state.S(), state.P(), size_t(3)});
+    neighbour_acceleration(state.arrays<Real>(), rest, *neighbours.start(Real()), head, theta_dt, values.data(),
+                           threads());
+    return values;
+}
+
+static Doubles neighbour_acceleration_of(const State &state, const RestShape &rest, const Neighbours &neighbours,
+                                         Array<const double, 4, 4> head, const StepSettings &settings) {
+    check_fits(state, rest);
+    require(neighbours.fits(rest.S, rest.P), "neighbours: made for another rest shape");
+    const double theta_dt = settings.theta * settings.dt;
+    const Pose pose = Pose::of(head.data());
+    return state.single() ? neighbour_acceleration_as<float>(state, rest, neighbours, pose, theta_dt)
+                          : neighbour_acceleration_as<double>(state, rest, neighbours, pose, theta_dt);
 }
 
 /// Bending, torsion, kinetic and gravity energy of a block of strands.
@@ -279,7 +314,9 @@ static void bind_values(nb::module_ &m) {
         .def_ro("contacts", &Report::contacts)
         .def_ro("solves", &Report::solves)
         .def_ro("halvings", &Report::halvings)
-        .def_ro("bad_strand", &Report::bad_strand);
+        .def_ro("bad_strand", &Report::bad_strand)
+        .def_ro("seconds", &Report::seconds)
+        .def_ro("neighbour_seconds", &Report::neighbour_seconds);
 }
 
 void bind_step(nb::module_ &m) {
@@ -288,7 +325,9 @@ void bind_step(nb::module_ &m) {
     m.def("at_rest", &at_rest, nb::arg("points"));
     m.def("distance", &distance, nb::arg("field"), nb::arg("points"));
     m.def("advance", &advance_state, nb::arg("state"), nb::arg("rest"), nb::arg("field").none(), nb::arg("drive"),
-          nb::arg("settings"));
+          nb::arg("settings"), nb::arg("neighbours") = nb::none());
+    m.def("neighbour_acceleration", &neighbour_acceleration_of, nb::arg("state"), nb::arg("rest"),
+          nb::arg("neighbours"), nb::arg("head"), nb::arg("settings"));
     m.def("energies", &energies, nb::arg("state"), nb::arg("rest"), nb::arg("settings"));
     m.def("relax", &relax, nb::arg("points"), nb::arg("rest"), nb::arg("method"), nb::arg("tolerance"));
 }

@@ -8,6 +8,7 @@
 #pragma once
 
 #include "contact.hpp"
+#include "neighbours.hpp"
 #include "settings.hpp"
 #include "stiffness.hpp"
 
@@ -60,6 +61,7 @@ template <class Real> struct Equation {
     const Contacts<Real> &contacts;
     Edges<Real> &edges;
     Vec3<Real> *f; // internal forces over m0
+    const Outside<Real> *outside = nullptr; // forces of other strands
 };
 
 /// Mass, drag, the row of a contact on the diagonal, and the right side of point i.
@@ -71,8 +73,13 @@ RINGLET_INLINE void add_point(const Equation<Real> &eq, int i, Window &window) {
     const Drag<Real> drag(b, eq.from, i, eq.settings, eq.step.wind);
     Lanes<Real> block[6];
     outer(drag.t, block, theta_dt * (drag.c_par - drag.c_perp), 1 + theta_dt * drag.c_perp);
+    Vec3<Real> push = eq.step.gravity + drag.push;
+    if (eq.outside) {
+        add_rate(*eq.outside, i, splat(theta_dt), block);
+        push = push + eq.outside->push[i];
+    }
     window.template add_block<0, 0>(b.mu[i], block);
-    window.add_right(b.mu[i] * v + splat(theta_dt) * (eq.f[i] + b.mu[i] * (eq.step.gravity + drag.push)));
+    window.add_right(b.mu[i] * v + splat(theta_dt) * (eq.f[i] + b.mu[i] * push));
     if (!eq.contacts.any_row || !any<Real>(eq.contacts.row[i] > 0)) return;
     // A contact's row: theta k dt^2 n n^T with k = 1e3 / dt^2, and its right side
     const Vec3<Real> n = eq.contacts.n[i];

@@ -30,6 +30,7 @@ void bind_develop(nb::module_ &m);
 void bind_energy(nb::module_ &m);
 void bind_shade(nb::module_ &m);
 void bind_expand(nb::module_ &m);
+void bind_neighbours(nb::module_ &m);
 void bind_step(nb::module_ &m);
 
 } // namespace ringlet
@@ -44,5 +45,6 @@ NB_MODULE(RINGLET_MODULE, m) {
     ringlet::bind_energy(m);
     ringlet::bind_shade(m);
     ringlet::bind_expand(m);
+    ringlet::bind_neighbours(m);
     ringlet::bind_step(m);
 }

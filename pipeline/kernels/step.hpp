@@ -33,6 +33,7 @@ template <class Real> class Stepper {
     Motion<Real> now;
     Contacts<Real> contacts;
     Tally<Real> tally;
+    const Outside<Real> *outside = nullptr; // forces of other strands, if they are counted
 
     Stepper(Arena &arena, int P, const StepSettings &settings, const DistanceField *field)
         : block(arena, P), now(arena, P), contacts(arena, P), settings_(settings), field_(field), next_(arena, P),
@@ -45,6 +46,14 @@ template <class Real> class Stepper {
     static size_t bytes(int P) {
         constexpr size_t pivots = 3 * 15, motions = 2 + 2 * kHalvings, points = 80;
         return sizeof(L) * ((pivots + 8 * motions + points) * P + 4096);
+    }
+
+    /// Takes a block of strands in, or gives it back after the step.
+    void exchange(Resident<Real> &other) {
+        std::swap(block, other.block);
+        std::swap(now, other.now);
+        std::swap(contacts.nearby, other.nearby);
+        std::swap(contacts.phi, other.phi);
     }
 
     void step(const Interval<Real> &interval, M wanted) {
@@ -151,7 +160,7 @@ template <class Real> class Stepper {
 
     /// Banded solve; rows that would pull are dropped and the system is solved again.
     void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
-        const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, f_};
+        const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, f_, outside};
         for (int again = 0;; ++again) {
             ++tally.solves;
             solvers_.solve(equation, again > 0, u_);
@@ -170,6 +179,7 @@ template <class Real> class Stepper {
             Vec3<Real> v = from.v[i];
             Vec3<Real> slowing = drag.c_perp * v + ((drag.c_par - drag.c_perp) * dot(v, drag.t)) * drag.t;
             Vec3<Real> a = (1 / block.mu[i]) * f_[i] + interval.gravity + drag.push - slowing;
+            if (outside) a = a + acceleration(*outside, i, v);
             u_[i] = select(block.free[i] > 0, v + dt * a, u_[i]);
             contacts.row[i] = L{};
         }

@@ -1,0 +1,393 @@
+// Hair-hair contact as a continuum: mass and momentum of all strands on a lattice that is fixed in the head's frame.
+//
+// Notation: h spacing of the lattice; w_n(x) trilinear weight of node n; m mass of a point; rho_n = sum m w_n / h^3
+// density and V_n mean velocity at a node; L_n density that is let pass: `density`, or the groom's own where that is
+// more, so that the groom keeps its shape. Where hair is denser it pushes (k_p [m^2/s^2]), and it takes the velocity
+// of the hair around it at the rate c_v (hair as a fluid: "Animating hair with volumetric interactions", Petrovic et
+// al. 2005). Between neighbouring nodes a and b the pressure is
+//     P = k_p e (min + min(min, L)) / 2,   e = min(e_max, max(0, (rho_a + rho_b) / (L_a + L_b) - 1)),
+// min the smaller density of both: in even hair grad P / rho = k_p grad(rho) / L, and at the rim of the hair, where
+// dividing by a small density would throw single points out, it stays bounded. A node and its points then get
+//     A_n = -sum of P over its faces / (h rho_n) + c_v V_n,    a = sum_n w_n A_n - c_v v.
+// Every face pushes both its nodes alike and the points take with the weights with which they gave: momentum is
+// conserved to rounding. Sums at a node run over the points in one order, whatever the number of threads.
+#pragma once
+
+#include "neighbours.hpp"
+#include "rest.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ringlet {
+
+/// Nodes low .. low + n - 1 of the lattice along x, y, z; y changes slowest, x fastest.
+struct Box {
+    int low[3] = {0, 0, 0}, n[3] = {0, 0, 0};
+
+    size_t size() const { return size_t(n[0]) * n[1] * n[2]; }
+    size_t row() const { return size_t(n[0]); }
+    size_t layer() const { return size_t(n[0]) * n[2]; }
+
+    bool contains(const Box &other) const {
+        for (int axis = 0; axis < 3; ++axis)
+            if (other.low[axis] < low[axis] || other.low[axis] + other.n[axis] > low[axis] + n[axis]) return false;
+        return true;
+    }
+
+    /// The nodes around places between these (in cells), and one more on every side.
+    static Box around(const double (&lowest)[3], const double (&highest)[3]) {
+        Box box;
+        for (int axis = 0; axis < 3; ++axis) {
+            box.low[axis] = int(std::floor(lowest[axis])) - 1;
+            box.n[axis] = int(std::floor(highest[axis])) + 3 - box.low[axis];
+        }
+        return box;
+    }
+};
+
+struct GridSettings {
+    double cell = 8e-3;     // [m] h
+    double density = 0.15;  // [kg/m^3] of the guides' own mass
+    double pressure = 0.05; // [m^2/s^2] k_p
+    double drag = 3;        // [1/s] c_v
+    double limit = 50;      // [m/s^2] largest acceleration by pressure along an axis
+};
+
+class HairGrid final : public Neighbours {
+  public:
+    const GridSettings settings;
+    Box groomed;                 // where there is hair at rest
+    std::vector<double> densest; // L on those nodes
+    double lowest[3], highest[3]; // how far strands reach, in cells
+
+    HairGrid(const RestShape &rest, const GridSettings &given) : settings(given), S_(rest.S), P_(rest.P) {
+        double longest = 0;
+        for (int s = 0; s < S_; ++s) {
+            double length = 0;
+            for (int j = 0; j + 1 < P_; ++j) length += rest.length[size_t(s) * (P_ - 1) + j];
+            longest = std::max(longest, length);
+        }
+        double low[3], high[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            low[axis] = 1e30, high[axis] = -1e30;
+            for (size_t k = axis; k < rest.points.size(); k += 3) {
+                low[axis] = std::min(low[axis], rest.points[k] / settings.cell);
+                high[axis] = std::max(high[axis], rest.points[k] / settings.cell);
+            }
+            lowest[axis] = low[axis] - longest / settings.cell;
+            highest[axis] = high[axis] + longest / settings.cell;
+        }
+        if (cells() < kMostCells) measure_groom(rest, Box::around(low, high));
+    }
+
+    static constexpr double kMostCells = 1 << 28;
+
+    /// Cells that the strands can reach.
+    double cells() const {
+        double product = 1;
+        for (int axis = 0; axis < 3; ++axis) product *= highest[axis] - lowest[axis] + 4;
+        return product;
+    }
+
+    bool fits(int S, int P) const override { return S == S_ && P == P_; }
+    std::unique_ptr<NeighbourForce<float>> start(float) const override;
+    std::unique_ptr<NeighbourForce<double>> start(double) const override;
+
+  private:
+    int S_, P_;
+
+    void measure_groom(const RestShape &rest, const Box &box) {
+        groomed = box;
+        densest.assign(box.size(), 0);
+        const double per_volume = std::pow(settings.cell, -3);
+        for (size_t k = 0; k < rest.mass.size(); ++k) {
+            double f[3];
+            size_t at[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                const double place = rest.points[3 * k + axis] / settings.cell - box.low[axis];
+                at[axis] = size_t(place), f[axis] = place - std::floor(place);
+            }
+            const size_t first = at[1] * box.layer() + at[2] * box.row() + at[0];
+            for (int corner = 0; corner < 8; ++corner) {
+                const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
+                const double w = (x ? f[0] : 1 - f[0]) * (y ? f[1] : 1 - f[1]) * (z ? f[2] : 1 - f[2]);
+                densest[first + y * box.layer() + z * box.row() + x] += w * rest.mass[k] * per_volume;
+            }
+        }
+        for (double &value : densest) value = std::max(value, settings.density);
+    }
+};
+
+template <class Real> class GridForce final : public NeighbourForce<Real> {
+    using L = Lanes<Real>;
+    using M = Mask<Real>;
+    typedef Real Four __attribute__((vector_size(4 * sizeof(Real))));
+    typedef Real Eight __attribute__((vector_size(8 * sizeof(Real))));
+    struct Node {
+        Four v; // a type of its own: template arguments lose attributes
+    };
+    static constexpr Real kNowhere = Real(-1e9); // place of a lane that takes no part
+
+  public:
+    explicit GridForce(const HairGrid &grid) : grid_(grid), settings_(grid.settings), turn_(identity()) {}
+
+    void look(const std::vector<Resident<Real>> &blocks, const Pose &head, double) override {
+        const int count = int(blocks.size());
+#pragma omp single
+        {
+            turn_ = Rigid<Real>(head);
+            ranges_.resize(count);
+            places_.resize(count * size_t(blocks[0].block.P));
+        }
+        const Rigid<Real> local(head.inverse());
+#pragma omp for schedule(static)
+        for (int b = 0; b < count; ++b) place(blocks[b], b, local);
+#pragma omp single
+        enclose();
+        const int slabs = int(slabs_.size()) - 1;
+#pragma omp for schedule(dynamic, 1)
+        for (int slab = 0; slab < slabs; ++slab) spread(blocks, slabs_[slab], slabs_[slab + 1]);
+#pragma omp for schedule(dynamic, 2)
+        for (int y = 1; y < box_.n[1] - 1; ++y)
+            for (int z = 1; z < box_.n[2] - 1; ++z) push_row(y * box_.layer() + z * box_.row());
+    }
+
+    void act(Resident<Real> &block, int number) override {
+        const int P = block.block.P;
+        const L drag = splat(Real(settings_.drag));
+        for (int i = 0; i < P; ++i) {
+            const Around around(places_[number * size_t(P) + i], box_);
+            Real a[3][kLanes<Real>];
+            for (int lane = 0; lane < kLanes<Real>; ++lane) {
+                const Four mean = around.mean(lane, nodes_.data(), box_);
+                for (int axis = 0; axis < 3; ++axis) a[axis][lane] = mean[axis + 1];
+            }
+            Vec3<Real> local;
+            __builtin_memcpy(&local, a, sizeof local);
+            const M nowhere = around.nowhere;
+            block.outside.push[i] = select(nowhere, drag * block.now.v[i], turn_.turn(local));
+            for (int k : {0, 3, 5}) block.outside.rate[6 * i + k] = drag;
+        }
+    }
+
+  private:
+    struct Range {
+        double low[3], high[3];
+    };
+
+    /// The cell of each lane's place and its place there.
+    struct Around {
+        M nowhere, y, at;     // takes no part; layer and index of the cell's first node
+        L fx, w00, w01, w10, w11; // weight of the upper x; weights along y, z
+
+        Around(Vec3<Real> place, const Box &box) : nowhere(place.y <= kNowhere) {
+            const Vec3<Real> inside = select(nowhere, Vec3<Real>{}, place - corner(box));
+            const M x = __builtin_convertvector(inside.x, M), z = __builtin_convertvector(inside.z, M);
+            y = __builtin_convertvector(inside.y, M);
+            at = (y * box.n[2] + z) * box.n[0] + x;
+            fx = inside.x - __builtin_convertvector(x, L);
+            const L fy = inside.y - __builtin_convertvector(y, L), fz = inside.z - __builtin_convertvector(z, L);
+            w00 = (1 - fy) * (1 - fz), w01 = (1 - fy) * fz, w10 = fy * (1 - fz), w11 = fy * fz;
+        }
+
+        RINGLET_INLINE Four mean(int lane, const Node *nodes, const Box &box) const {
+            const Node *node = nodes + at[lane];
+            Eight sum = w00[lane] * pair(node) + w01[lane] * pair(node + box.row());
+            sum += w10[lane] * pair(node + box.layer()) + w11[lane] * pair(node + box.layer() + box.row());
+            const Four low = __builtin_shufflevector(sum, sum, 0, 1, 2, 3);
+            const Four high = __builtin_shufflevector(sum, sum, 4, 5, 6, 7);
+            return low + fx[lane] * (high - low);
+        }
+    };
+
+    const HairGrid &grid_;
+    const GridSettings &settings_;
+    Rigid<Real> turn_;
+    Box box_;
+    std::vector<Range> ranges_;
+    std::vector<Vec3<Real>> places_; // of every point, in cells
+    std::vector<int> slabs_;         // first layers of what one thread fills at a time
+    std::vector<Node> nodes_;        // density and momentum, then density and A
+    std::vector<Real> density_, let_pass_;
+
+    static Pose identity() { return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}}; }
+
+    static Vec3<Real> corner(const Box &box) {
+        return {splat(Real(box.low[0])), splat(Real(box.low[1])), splat(Real(box.low[2]))};
+    }
+
+    static RINGLET_INLINE Eight pair(const Node *node) {
+        Eight both;
+        __builtin_memcpy(&both, node, sizeof both);
+        return both;
+    }
+
+    /// Places of a block's points; those of no strand, lost or out of all reach take no part.
+    void place(const Resident<Real> &resident, int number, const Rigid<Real> &local) {
+        const L per_cell = splat(Real(1 / settings_.cell)), far = splat(Real(1e9));
+        const Vec3<Real> lowest = broadcast(grid_.lowest), highest = broadcast(grid_.highest);
+        const int P = resident.block.P;
+        M own{};
+        for (int lane = 0; lane < resident.index.count; ++lane) own[lane] = -1;
+        Vec3<Real> low{far, far, far}, high{-far, -far, -far};
+        for (int i = 0; i < P; ++i) {
+            const Vec3<Real> at = per_cell * local(resident.now.x[i]);
+            const M here = own & (at.x >= lowest.x) & (at.x <= highest.x) & (at.y >= lowest.y) & (at.y <= highest.y) &
+                           (at.z >= lowest.z) & (at.z <= highest.z) & (dot(resident.now.v[i], resident.now.v[i]) < Real(1e12));
+            places_[number * size_t(P) + i] = select(here, at, Vec3<Real>{-far, -far, -far});
+            low = {minimum<Real>(low.x, select<Real>(here, at.x, far)), minimum<Real>(low.y, select<Real>(here, at.y, far)),
+                   minimum<Real>(low.z, select<Real>(here, at.z, far))};
+            high = {maximum<Real>(high.x, select<Real>(here, at.x, -far)), maximum<Real>(high.y, select<Real>(here, at.y, -far)),
+                    maximum<Real>(high.z, select<Real>(here, at.z, -far))};
+        }
+        ranges_[number] = {{smallest<Real>(low.x), smallest<Real>(low.y), smallest<Real>(low.z)},
+                           {largest<Real>(high.x), largest<Real>(high.y), largest<Real>(high.z)}};
+    }
+
+    static Vec3<Real> broadcast(const double (&a)[3]) {
+        return {splat(Real(a[0])), splat(Real(a[1])), splat(Real(a[2]))};
+    }
+
+    /// A box around all places; the last one as long as it holds them and is not much too large.
+    void enclose() {
+        double low[3] = {1e30, 1e30, 1e30}, high[3] = {-1e30, -1e30, -1e30};
+        for (const Range &range : ranges_)
+            for (int axis = 0; axis < 3; ++axis) {
+                low[axis] = std::min(low[axis], range.low[axis]);
+                high[axis] = std::max(high[axis], range.high[axis]);
+            }
+        if (low[0] > high[0]) std::fill_n(low, 3, 0.0), std::fill_n(high, 3, 0.0); // no point takes part
+        const Box tight = Box::around(low, high);
+        if (box_.contains(tight) && double(box_.size()) < 1.5 * double(tight.size())) return;
+        box_ = tight;
+        for (int axis = 0; axis < 3; ++axis) box_.low[axis] -= 1, box_.n[axis] += 2;
+        nodes_.resize(box_.size());
+        density_.resize(box_.size());
+        fill_let_pass();
+        const int layers = box_.n[1], slabs = std::min(layers, kSlabs);
+        slabs_.clear();
+        for (int slab = 0; slab <= slabs; ++slab) slabs_.push_back(layers * slab / slabs);
+    }
+
+    static constexpr int kSlabs = 16;
+
+    void fill_let_pass() {
+        const Box &rest = grid_.groomed;
+        let_pass_.assign(box_.size(), Real(settings_.density));
+        for (int y = 0; y < rest.n[1]; ++y)
+            for (int z = 0; z < rest.n[2]; ++z)
+                for (int x = 0; x < rest.n[0]; ++x) {
+                    const int to[3] = {x + rest.low[0] - box_.low[0], y + rest.low[1] - box_.low[1],
+                                       z + rest.low[2] - box_.low[2]};
+                    bool inside = true;
+                    for (int axis = 0; axis < 3; ++axis) inside = inside && to[axis] >= 0 && to[axis] < box_.n[axis];
+                    if (inside)
+                        let_pass_[to[1] * box_.layer() + to[2] * box_.row() + to[0]] =
+                            Real(grid_.densest[y * rest.layer() + z * rest.row() + x]);
+                }
+    }
+
+    /// Gives mass and momentum of all points to the nodes of the layers first .. last - 1.
+    void spread(const std::vector<Resident<Real>> &blocks, int first, int last) {
+        std::fill(nodes_.begin() + first * box_.layer(), nodes_.begin() + last * box_.layer(), Node{});
+        const Rigid<Real> back(inverse_turn());
+        const L per_volume = splat(Real(std::pow(settings_.cell, -3)));
+        const L from = splat(Real(box_.low[1] + first - 1)), to = splat(Real(box_.low[1] + last));
+        for (size_t b = 0; b < blocks.size(); ++b) {
+            const Resident<Real> &resident = blocks[b];
+            for (int i = 0; i < resident.block.P; ++i) {
+                const Vec3<Real> at = places_[b * resident.block.P + i];
+                const M here = (at.y >= from) & (at.y < to);
+                if (!any<Real>(here)) continue;
+                const Around around(at, box_);
+                const L mass = resident.block.mu[i] * resident.block.m0 * per_volume;
+                const Vec3<Real> momentum = mass * back.turn(resident.now.v[i]);
+                for (int lane = 0; lane < kLanes<Real>; ++lane) {
+                    if (!here[lane]) continue;
+                    const Four all = {mass[lane], momentum.x[lane], momentum.y[lane], momentum.z[lane]};
+                    give(around, lane, all, around.y[lane] >= first, around.y[lane] + 1 < last);
+                }
+            }
+        }
+        for (size_t k = first * box_.layer(); k < last * box_.layer(); ++k) density_[k] = nodes_[k].v[0];
+    }
+
+    Pose inverse_turn() const {
+        Pose pose = identity();
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) pose.R[i][j] = double(turn_.R[j][i]);
+        return pose;
+    }
+
+    RINGLET_INLINE void give(const Around &around, int lane, Four all, bool lower, bool upper) {
+        const Four high = around.fx[lane] * all, low = all - high;
+        const Eight share = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+        Node *node = nodes_.data() + around.at[lane];
+        if (lower) {
+            add(node, around.w00[lane] * share);
+            add(node + box_.row(), around.w01[lane] * share);
+        }
+        if (upper) {
+            add(node + box_.layer(), around.w10[lane] * share);
+            add(node + box_.layer() + box_.row(), around.w11[lane] * share);
+        }
+    }
+
+    static RINGLET_INLINE void add(Node *node, Eight share) {
+        const Eight sum = pair(node) + share;
+        __builtin_memcpy(node, &sum, sizeof sum);
+    }
+
+    /// From density and momentum to density and A, for a row of nodes.
+    void push_row(size_t begin) {
+        const int n = box_.n[0];
+        const Real *rho = density_.data() + begin;
+        if (std::none_of(rho, rho + n, [](Real value) { return value > 0; })) return;
+        std::vector<Real> &force = row_memory(3 * size_t(n));
+        const size_t strides[3] = {1, box_.layer(), box_.row()};
+        for (int axis = 0; axis < 3; ++axis) face_forces(begin, strides[axis], force.data() + axis * n);
+        const Real per_cell = Real(1 / settings_.cell), drag = Real(settings_.drag);
+        for (int x = 1; x < n - 1; ++x) {
+            if (!(rho[x] > 0)) continue;
+            Four &node = nodes_[begin + x].v;
+            const Real inverse = 1 / rho[x];
+            node = (Four{0, force[x], force[n + x], force[2 * n + x]} * per_cell + drag * node) * inverse;
+        }
+    }
+
+    static std::vector<Real> &row_memory(size_t count) {
+        thread_local std::vector<Real> memory;
+        memory.resize(count);
+        return memory;
+    }
+
+    /// Difference of the pressures on the two faces along an axis, for a row of nodes.
+    void face_forces(size_t begin, size_t stride, Real *force) const {
+        const Real *rho = density_.data() + begin, *pass = let_pass_.data() + begin;
+        const Real k = Real(settings_.pressure), most = Real(settings_.limit * settings_.cell / (2 * settings_.pressure));
+        const int n = box_.n[0];
+        const ptrdiff_t s = ptrdiff_t(stride);
+#pragma omp simd
+        for (int x = 1; x < n - 1; ++x)
+            force[x] = face(rho[x - s], rho[x], pass[x - s], pass[x], k, most) -
+                       face(rho[x], rho[x + s], pass[x], pass[x + s], k, most);
+    }
+
+    static RINGLET_INLINE Real face(Real a, Real b, Real pass_a, Real pass_b, Real k, Real most) {
+        const Real pass = pass_a + pass_b, less = a < b ? a : b;
+        Real excess = (a + b) / pass - 1;
+        excess = excess > 0 ? (excess < most ? excess : most) : 0;
+        const Real half = Real(0.5) * pass;
+        return k * excess * Real(0.5) * (less + (less < half ? less : half));
+    }
+};
+
+inline std::unique_ptr<NeighbourForce<float>> HairGrid::start(float) const {
+    return std::make_unique<GridForce<float>>(*this);
+}
+inline std::unique_ptr<NeighbourForce<double>> HairGrid::start(double) const {
+    return std::make_unique<GridForce<double>>(*this);
+}
+
+} // namespace ringlet
