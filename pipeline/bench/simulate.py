@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
-from pipeline.config.schema import Motion, Simulate
+from pipeline.config.schema import HairContact, Motion, Simulate
+from pipeline.simulate.hair_contact import Cost
 from pipeline.simulate.stepper import Guides, Simulation
 
 _HEAD = 0.1  # radius [m]
 _LENGTH = 0.25
+_STRANDS = 60  # strands that a guide stands for
 _OFFSET, _LIFT = 1e-3, 15e-3  # distance that the lowest and the uppermost layer keep from the head [m]
 _FRAMES = 20
 _REPEATS = 7
@@ -22,22 +24,26 @@ def bench(
     points: int = 32,
     precision: Literal["float32", "float64"] = "float32",
     threads: int = 2,
+    hair: Literal["none", "grid", "capsule"] = "none",
 ) -> dict[str, float]:
     """Step wavy hair of 25 cm that has settled on a shaking head, at dt = 1/240 s, with the stage's own stepper.
 
-    Returns ns_per_point_step and frames_per_second (10 steps a frame), medians over repeats, and threads.
+    `hair` is the method of hair-hair contact. Returns ns_per_point_step and frames_per_second (10 steps a frame),
+    medians over repeats, threads, and hair_ms_per_step, the part of hair-hair contact.
     """
     kernels.set_threads(threads)
     motion = Motion(preset="shake", period=1.0, swings=1000, amplitude=0.3, pivot=(0.0, 0.0, 0.0))
-    simulate = Simulate(precision=precision, motion=motion)
+    simulate = Simulate(precision=precision, motion=motion, hair_contact=HairContact(method=hair))
     simulation = Simulation(simulate, seed=1, guides=round_head(guides, points))
     simulation.settle()
+    simulation.cost = Cost()
     seconds = [_timed(simulation) for _ in range(1 + _REPEATS)][1:]
     frame = float(np.median(seconds)) / _FRAMES
     return {
         "ns_per_point_step": round(frame / (simulate.substeps * guides * points) * 1e9, 3),
         "frames_per_second": round(1 / frame, 3),
         "threads": threads,
+        "hair_ms_per_step": round(simulation.cost.neighbours / simulation.cost.steps * 1e3, 3),
     }
 
 
@@ -60,6 +66,7 @@ def round_head(guides: int, points: int) -> Guides:
         pins=np.tile(np.array([2, 0], np.uint8), (guides, 1)),
         offset=np.clip(distance, _OFFSET, _LIFT).astype(np.float32),
         field=_sphere(),
+        strands=_STRANDS * guides,
     )
 
 

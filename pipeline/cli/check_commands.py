@@ -51,12 +51,15 @@ def bench_simulate(
     points: Count = 32,
     precision: Literal["float32", "float64"] = "float32",
     threads: Annotated[int, Parameter(help="0 for all processors.")] = 0,
+    hair: Annotated[
+        Literal["none", "grid", "capsule"], Parameter(help="Method of hair-hair contact.")
+    ] = "none",
     json: Json = False,
 ) -> None:
     """Steps of guides on a head: nanoseconds for each point and step."""
     from pipeline.bench.simulate import bench
 
-    _report(bench(guides=guides, points=points, precision=precision, threads=threads), json)
+    _report(bench(guides=guides, points=points, precision=precision, threads=threads, hair=hair), json)
 
 
 @bench.command(name="interpolate")

@@ -208,17 +208,67 @@ class Report:
     """Steps that were taken again as two half steps."""
     bad_strand: int
     """Index of the first strand that is no longer finite, or -1."""
+    seconds: float
+    """Wall time of the call: the only number here that may differ between two equal calls, with the next one."""
+    neighbour_seconds: float
+    """Of it, that of hair-hair contact."""
+
+class Neighbours:
+    """A method of hair-hair contact for the strands of one rest shape: `HairGrid` or `HairCapsules`."""
+
+class HairGrid(Neighbours):
+    """Hair as a continuum: where it is denser than allowed it pushes, and it takes on the velocity around it.
+
+    Mass and momentum go to a grid in the head's frame and accelerations come back, both trilinearly: momentum is
+    conserved to rounding. Where the rest shape is denser than `density`, its own density is allowed.
+    """
+
+    def __init__(
+        self, rest: RestShape, cell: float, density: float, pressure: float, drag: float, limit: float
+    ) -> None:
+        """The densities of the rest shape, on the grid.
+
+        Args:
+            rest: the strands, in the head's rest frame.
+            cell: [m] spacing of the grid.
+            density: [kg/m^3] above which hair pushes, of the mass in `rest.mass`.
+            pressure: [m^2/s^2] k_p of a = -k_p grad(density / allowed).
+            drag: [1/s] the rate at which velocities blend.
+            limit: [m/s^2] largest push along each axis.
+
+        Raises:
+            ValueError: a value outside its range, or cells too small for the reach of the strands.
+
+        """
 
 def advance(
-    state: State, rest: RestShape, field: DistanceField | None, drive: Drive, settings: StepSettings
+    state: State,
+    rest: RestShape,
+    field: DistanceField | None,
+    drive: Drive,
+    settings: StepSettings,
+    neighbours: Neighbours | None = None,
 ) -> Report:
     """Advances the state in place by the steps of the drive.
 
-    A strand's motion depends neither on the number of threads nor on the strands beside it. Never raises for bad
-    physics: see `Report.bad_strand`.
+    Without neighbours a strand's motion depends neither on the number of threads nor on the strands beside it. With
+    hair-hair contact all strands go step by step together; the result depends neither on the number of threads nor on
+    how the steps are split into calls. Never raises for bad physics: see `Report.bad_strand`.
 
     Raises:
         ValueError: shapes that do not fit, or settings outside their range.
+
+    """
+
+def neighbour_acceleration(
+    state: State, rest: RestShape, neighbours: Neighbours, head: _F64, settings: StepSettings
+) -> _F64:
+    """(S, P, 3) float64 [m/s^2]: what the neighbours do to every point, with the head at the pose (4, 4).
+
+    Of the settings, theta and dt count: soft contacts are softened so that a step of this length is stable.
+
+    Raises:
+        ValueError: shapes that do not fit.
 
     """
 

@@ -5,8 +5,8 @@
 // more, so that the groom keeps its shape. Where hair is denser it pushes (k_p [m^2/s^2]), and it takes the velocity
 // of the hair around it at the rate c_v (hair as a fluid: "Animating hair with volumetric interactions", Petrovic et
 // al. 2005). Between neighbouring nodes a and b the pressure is
-//     P = k_p e (min + min(min, L)) / 2,   e = min(e_max, max(0, (rho_a + rho_b) / (L_a + L_b) - 1)),
-// min the smaller density of both: in even hair grad P / rho = k_p grad(rho) / L, and at the rim of the hair, where
+//     P = k_p e (min + min(min, L)) / 2,   e = min(e_max, max(0, (rho_a / L_a + rho_b / L_b) / 2 - 1)),
+// L the mean and min the smaller density of both: in even hair grad P / rho = k_p grad(rho) / L, and at the rim of the hair, where
 // dividing by a small density would throw single points out, it stays bounded. A node and its points then get
 //     A_n = -sum of P over its faces / (h rho_n) + c_v V_n,    a = sum_n w_n A_n - c_v v.
 // Every face pushes both its nodes alike and the points take with the weights with which they gave: momentum is
@@ -150,7 +150,7 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
         for (int slab = 0; slab < slabs; ++slab) spread(blocks, slabs_[slab], slabs_[slab + 1]);
 #pragma omp for schedule(dynamic, 2)
         for (int y = 1; y < box_.n[1] - 1; ++y)
-            for (int z = 1; z < box_.n[2] - 1; ++z) push_row(y * box_.layer() + z * box_.row());
+            for (int z = 1; z < box_.n[2] - 1; ++z) push_row(y * box_.n[2] + z);
     }
 
     void act(Resident<Real> &block, int number) override {
@@ -209,7 +209,9 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
     std::vector<Vec3<Real>> places_; // of every point, in cells
     std::vector<int> slabs_;         // first layers of what one thread fills at a time
     std::vector<Node> nodes_;        // density and momentum, then density and A
-    std::vector<Real> density_, let_pass_;
+    std::vector<Real> density_, excess_; // rho and rho / L - 1 of a node
+    std::vector<Real> let_pass_, per_let_pass_;
+    std::vector<uint8_t> pushes_; // whether any node of a row has an excess
 
     static Pose identity() { return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}}; }
 
@@ -259,22 +261,27 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
             }
         if (low[0] > high[0]) std::fill_n(low, 3, 0.0), std::fill_n(high, 3, 0.0); // no point takes part
         const Box tight = Box::around(low, high);
-        if (box_.contains(tight) && double(box_.size()) < 1.5 * double(tight.size())) return;
-        box_ = tight;
-        for (int axis = 0; axis < 3; ++axis) box_.low[axis] -= 1, box_.n[axis] += 2;
+        Box roomy = tight;
+        for (int axis = 0; axis < 3; ++axis) roomy.low[axis] -= 1, roomy.n[axis] += 2;
+        roomy.n[0] = (roomy.n[0] + kLanes<float> - 1) / kLanes<float> * kLanes<float>; // whole lanes in a row
+        if (box_.contains(tight) && 2 * box_.size() < 3 * roomy.size()) return;
+        box_ = roomy;
         nodes_.resize(box_.size());
         density_.resize(box_.size());
+        excess_.resize(box_.size());
+        pushes_.resize(size_t(box_.n[1]) * box_.n[2]);
         fill_let_pass();
         const int layers = box_.n[1], slabs = std::min(layers, kSlabs);
         slabs_.clear();
         for (int slab = 0; slab <= slabs; ++slab) slabs_.push_back(layers * slab / slabs);
     }
 
-    static constexpr int kSlabs = 16;
+    static constexpr int kSlabs = 8;
 
     void fill_let_pass() {
         const Box &rest = grid_.groomed;
         let_pass_.assign(box_.size(), Real(settings_.density));
+        per_let_pass_.resize(box_.size());
         for (int y = 0; y < rest.n[1]; ++y)
             for (int z = 0; z < rest.n[2]; ++z)
                 for (int x = 0; x < rest.n[0]; ++x) {
@@ -286,6 +293,7 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
                         let_pass_[to[1] * box_.layer() + to[2] * box_.row() + to[0]] =
                             Real(grid_.densest[y * rest.layer() + z * rest.row() + x]);
                 }
+        for (size_t k = 0; k < let_pass_.size(); ++k) per_let_pass_[k] = 1 / let_pass_[k];
     }
 
     /// Gives mass and momentum of all points to the nodes of the layers first .. last - 1.
@@ -310,7 +318,19 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
                 }
             }
         }
-        for (size_t k = first * box_.layer(); k < last * box_.layer(); ++k) density_[k] = nodes_[k].v[0];
+        for (int row = first * box_.n[2]; row < last * box_.n[2]; ++row) measure_row(row);
+    }
+
+    /// Density and excess of a row of nodes.
+    void measure_row(int row) {
+        const size_t begin = row * box_.row(), end = begin + box_.row();
+        Real most = -1;
+        for (size_t k = begin; k < end; ++k) {
+            density_[k] = nodes_[k].v[0];
+            excess_[k] = density_[k] * per_let_pass_[k] - 1;
+            most = excess_[k] > most ? excess_[k] : most;
+        }
+        pushes_[row] = most > 0;
     }
 
     Pose inverse_turn() const {
@@ -340,19 +360,23 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
     }
 
     /// From density and momentum to density and A, for a row of nodes.
-    void push_row(size_t begin) {
+    void push_row(int row) {
+        const size_t begin = row * box_.row();
         const int n = box_.n[0];
-        const Real *rho = density_.data() + begin;
-        if (std::none_of(rho, rho + n, [](Real value) { return value > 0; })) return;
-        std::vector<Real> &force = row_memory(3 * size_t(n));
+        std::vector<Real> &force = row_memory(4 * size_t(n));
+        const bool pushed = pushes_[row] || pushes_[row - 1] || pushes_[row + 1] || pushes_[row - box_.n[2]] ||
+                            pushes_[row + box_.n[2]];
         const size_t strides[3] = {1, box_.layer(), box_.row()};
-        for (int axis = 0; axis < 3; ++axis) face_forces(begin, strides[axis], force.data() + axis * n);
+        for (int axis = 0; axis < 3 && pushed; ++axis) face_forces(begin, strides[axis], force.data() + axis * n);
+        if (!pushed) std::fill_n(force.begin(), 3 * n, Real(0));
         const Real per_cell = Real(1 / settings_.cell), drag = Real(settings_.drag);
-        for (int x = 1; x < n - 1; ++x) {
-            if (!(rho[x] > 0)) continue;
+        Real *inverse = force.data() + 3 * n;
+#pragma omp simd
+        for (int x = 0; x < n; ++x) inverse[x] = 1 / density_[begin + x];
+        for (int x = 0; x < n; ++x) {
+            if (!(density_[begin + x] > 0)) continue;
             Four &node = nodes_[begin + x].v;
-            const Real inverse = 1 / rho[x];
-            node = (Four{0, force[x], force[n + x], force[2 * n + x]} * per_cell + drag * node) * inverse;
+            node = (per_cell * Four{0, force[x], force[n + x], force[2 * n + x]} + drag * node) * inverse[x];
         }
     }
 
@@ -364,22 +388,16 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
 
     /// Difference of the pressures on the two faces along an axis, for a row of nodes.
     void face_forces(size_t begin, size_t stride, Real *force) const {
-        const Real *rho = density_.data() + begin, *pass = let_pass_.data() + begin;
-        const Real k = Real(settings_.pressure), most = Real(settings_.limit * settings_.cell / (2 * settings_.pressure));
-        const int n = box_.n[0];
-        const ptrdiff_t s = ptrdiff_t(stride);
+        const Real *rho = density_.data() + begin, *e = excess_.data() + begin, *pass = let_pass_.data() + begin;
+        const Real k = Real(settings_.pressure / 2), most = Real(settings_.limit * settings_.cell / (2 * settings_.pressure));
+        const auto s = ptrdiff_t(stride), n = ptrdiff_t(box_.n[0]);
+        const auto face = [=](ptrdiff_t a, ptrdiff_t b) {
+            const Real less = rho[a] < rho[b] ? rho[a] : rho[b], mean = Real(0.5) * (pass[a] + pass[b]);
+            const Real both = Real(0.5) * (e[a] + e[b]), excess = both > 0 ? (both < most ? both : most) : 0;
+            return k * excess * (less + (less < mean ? less : mean));
+        };
 #pragma omp simd
-        for (int x = 1; x < n - 1; ++x)
-            force[x] = face(rho[x - s], rho[x], pass[x - s], pass[x], k, most) -
-                       face(rho[x], rho[x + s], pass[x], pass[x + s], k, most);
-    }
-
-    static RINGLET_INLINE Real face(Real a, Real b, Real pass_a, Real pass_b, Real k, Real most) {
-        const Real pass = pass_a + pass_b, less = a < b ? a : b;
-        Real excess = (a + b) / pass - 1;
-        excess = excess > 0 ? (excess < most ? excess : most) : 0;
-        const Real half = Real(0.5) * pass;
-        return k * excess * Real(0.5) * (less + (less < half ? less : half));
+        for (ptrdiff_t x = 0; x < n; ++x) force[x] = face(x - s, x) - face(x, x + s);
     }
 };
 

@@ -54,6 +54,7 @@ def read_guides(experiment: cache.Experiment) -> tuple[Guides, NDArray[np.uint32
             pins=groom["strands/pins"][strand],
             offset=groom["guides/offset"][:],
             field=distance_field(groom),
+            strands=len(groom["strands/points"]),
         )
     return guides, strand
 
@@ -74,6 +75,8 @@ def _fill(segments: cache.Segments, simulation: Simulation) -> None:
             if len(frames) == CHECKPOINT_FRAMES or index == simulation.simulate.frames:
                 segments.append(frames, simulation.save())
                 frames = []
+    if simulation.neighbours is not None:
+        say("simulate", simulation.cost.line(simulation.simulate.hair_contact.method))
 
 
 def _keep(simulation: Simulation, path: Path, key: str) -> None:

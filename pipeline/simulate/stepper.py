@@ -11,6 +11,7 @@ from pipeline import kernels
 from pipeline.cache import Frame
 from pipeline.config.schema import Simulate
 from pipeline.errors import InputError
+from pipeline.simulate.hair_contact import Cost, neighbours
 from pipeline.simulate.motion import head_motion, tip_motion
 from pipeline.simulate.rest import rest_shape, settling, step_settings
 from pipeline.simulate.wind import wind
@@ -44,6 +45,8 @@ class Guides:
     """(G, P) [m]: distance that points keep from the head."""
     field: kernels.DistanceField | None = None
     """Distance to the head; None without one."""
+    strands: int = 0
+    """Strands of the groom that they stand for; 0 for no more than themselves."""
 
 
 class Simulation:
@@ -62,6 +65,9 @@ class Simulation:
         self.rest = rest_shape(simulate.hair, guides.points, guides.pins, guides.offset)
         self.field = guides.field
         self.settings = step_settings(simulate)
+        each = max(guides.strands, len(guides.points)) / len(guides.points)
+        self.neighbours = neighbours(simulate.hair_contact, self.rest, each)
+        self.cost = Cost()
         self.head = head_motion(simulate.motion)
         self.hand = tip_motion(simulate.tips, _middle_of_tips(guides), simulate.settle / 2)
         self.wind = wind(simulate.air, seed)
@@ -117,7 +123,8 @@ class Simulation:
         hands = [head @ self.hand(self._time(i)) for i, head in enumerate(heads)]
         winds = [self.wind(self._time(i + 0.5)) for i in range(count)]
         drive = kernels.Drive(np.array(heads), np.array(winds), np.array(hands))
-        report = kernels.advance(self.state, self.rest, self.field, drive, settings)
+        report = kernels.advance(self.state, self.rest, self.field, drive, settings, self.neighbours)
+        self.cost.add(count, report)
         self.step += count
         self._diagnostics = _summary(report)
         self.check()

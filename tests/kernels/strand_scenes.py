@@ -126,3 +126,17 @@ def hairy_sphere(strand: Points, count: int, radius: float = 0.09, offset: float
         lift = rotation(tuple(axis), np.arctan2(np.linalg.norm(axis), n[0]))
         strands.append((radius + offset) * n + (strand - strand[0]) @ (lift @ rotation((1, 0, 0), 2.4 * k)).T)
     return np.array(strands)
+
+
+ARRAYS = ("points", "velocity", "tension", "contact")
+"""What a state consists of."""
+
+
+def copy(state: kernels.State) -> kernels.State:
+    """The state, in arrays of its own."""
+    return kernels.State(*(getattr(state, name).copy() for name in ARRAYS))
+
+
+def same(a: kernels.State, b: kernels.State) -> bool:
+    """Whether two states are equal to the last bit."""
+    return all(getattr(a, name).tobytes() == getattr(b, name).tobytes() for name in ARRAYS)

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from strand_scenes import (
     FREE,
     STILL,
+    copy,
     drive,
     hairy_sphere,
     roots,
     rotation,
+    same,
     settings,
     shake,
     shape,
@@ -24,7 +26,6 @@ from strand_scenes import (
 from pipeline import kernels
 
 Points = NDArray[np.float64]
-ARRAYS = ("points", "velocity", "tension", "contact")
 
 
 @pytest.fixture(autouse=True)
@@ -33,15 +34,6 @@ def _threads() -> Iterator[None]:
     count = kernels.threads()
     yield
     kernels.set_threads(count)
-
-
-def copy(state: kernels.State) -> kernels.State:
-    return kernels.State(*(getattr(state, name).copy() for name in ARRAYS))
-
-
-def same(a: kernels.State, b: kernels.State) -> bool:
-    """Whether two states are equal to the last bit."""
-    return all(getattr(a, name).tobytes() == getattr(b, name).tobytes() for name in ARRAYS)
 
 
 def curly_head(count: int, precision: type = np.float32) -> tuple[kernels.RestShape, kernels.State]:

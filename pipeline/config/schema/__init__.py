@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from pipeline.config.schema.base import Section
 from pipeline.config.schema.groom import Clump, Curl, Cut, Frizz, Groom, Parting, Path, Swatch
+from pipeline.config.schema.hair_contact import HairContact
 from pipeline.config.schema.interpolate import Interpolate, Variation
 from pipeline.config.schema.render import Fibre, Render
 from pipeline.config.schema.scene import Camera, Light, Scene
@@ -26,6 +27,7 @@ __all__ = [
     "Frizz",
     "Groom",
     "Hair",
+    "HairContact",
     "Interpolate",
     "Keyframe",
     "Keyframes",

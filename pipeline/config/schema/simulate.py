@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from pipeline.config.schema.base import Position, Section, Velocity
+from pipeline.config.schema.hair_contact import HairContact
 from pipeline.config.units import Acceleration, Angle, Density, Duration, Length, Pressure, Rate, Speed
 
 
@@ -105,6 +106,8 @@ class Simulate(Section):
     """Drag and wind."""
     contact: Contact = Contact()
     """Hair on head."""
+    hair_contact: HairContact = HairContact()
+    """Hair on hair."""
     motion: Motion = Motion()
     """Motion of the head."""
     tips: Keyframes = ()

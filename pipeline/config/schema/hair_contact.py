@@ -1,0 +1,29 @@
+"""Options of hair-hair contact: what the guides do to one another."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.config.schema.base import Section
+from pipeline.config.units import Acceleration, Density, Length, Rate
+
+
+class HairContact(Section):
+    method: Literal["none", "grid", "capsule"] = "grid"
+    """How guides keep apart: "grid" (hair as a fluid; cheap), "capsule" (guides as soft rods that collide and rub) or "none"."""
+    density: Annotated[Density, Field(gt=0)] = 10.0
+    """Grid: hair that is denser pushes, counted with all strands of the groom; where the groom is denser, that counts."""
+    cell: Annotated[Length, Field(gt=0)] = 8e-3
+    """Grid: spacing of the grid; about the distance of the guides."""
+    pressure: Annotated[float, Field(ge=0)] = 0.05
+    """Grid: how hard hair of twice the density pushes [m^2/s^2]."""
+    drag: Annotated[Rate, Field(ge=0)] = 3.0
+    """Grid: the rate at which a guide takes on the velocity of the hair around it."""
+    radius: Annotated[Length, Field(gt=0)] = 1.5e-3
+    """Capsule: radius of the wisp that a guide stands for; guides that are groomed nearer stay as near."""
+    stiffness: Annotated[float, Field(ge=0)] = 0.005
+    """Capsule: force per depth of two wisps in each other [N/m]."""
+    friction: Annotated[float, Field(ge=0, le=2)] = 0.3
+    """Capsule: Coulomb friction between wisps."""
+    limit: Annotated[Acceleration, Field(gt=0)] = 50.0
+    """Largest acceleration by which a neighbour pushes: hair that starts too dense comes out slowly."""
