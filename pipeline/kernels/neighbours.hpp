@@ -48,7 +48,7 @@ template <class Real> struct Resident {
           phi(arena.take<Lanes<Real>>(P)) {}
 
     /// Bytes that a Resident takes from its arena.
-    static size_t bytes(int P) { return sizeof(Lanes<Real>) * 64 * (size_t(P) + 2); }
+    static size_t bytes(int P) { return sizeof(Lanes<Real>) * 96 * (size_t(P) + 2); }
 };
 
 /// A method at work in one call of `advance`: in every step it sees each block, looks at all, and acts on each.
