@@ -2,15 +2,13 @@
 //
 // Notation: h spacing of the lattice; w_n(x) trilinear weight of node n; m mass of a point; rho_n = sum m w_n / h^3
 // density and V_n mean velocity at a node; L_n density that is let pass: `density`, or the groom's own where that is
-// more, so that the groom keeps its shape. Where hair is denser it pushes (k_p [m^2/s^2]), and it takes the velocity
-// of the hair around it at the rate c_v (hair as a fluid: "Animating hair with volumetric interactions", Petrovic et
-// al. 2005). Between neighbouring nodes a and b the pressure is
-//     P = k_p e (min + min(min, L)) / 2,   e = min(e_max, max(0, (rho_a / L_a + rho_b / L_b) / 2 - 1)),
-// L the mean and min the smaller density of both: in even hair grad P / rho = k_p grad(rho) / L, and at the rim of the hair, where
-// dividing by a small density would throw single points out, it stays bounded. A node and its points then get
-//     A_n = -sum of P over its faces / (h rho_n) + c_v V_n,    a = sum_n w_n A_n - c_v v.
-// Every face pushes both its nodes alike and the points take with the weights with which they gave: momentum is
-// conserved to rounding. Sums at a node run over the points in one order, whatever the number of threads.
+// more, so that the groom keeps its shape. A point gets
+//     a = -sum_n grad w_n p_n + c_v sum_n w_n (V_n - v),     p_n = min(p_max, k_p max(0, rho_n / L_n - 1)).
+// Where hair is denser it pushes, and it takes on the velocity of the hair around it (hair as a fluid: "Animating hair
+// with volumetric interactions", Petrovic et al. 2005). The first term is the gradient of an energy, a function of the
+// densities alone, without which a bundle never comes to rest (measured: test_a_bundle_keeps_its_width); it keeps
+// momentum to about a percent. The second term keeps it to rounding: points take with the weights that they gave with.
+// Sums at a node run over the points in one order, whatever the number of threads.
 #pragma once
 
 #include "neighbours.hpp"
@@ -51,7 +49,7 @@ struct GridSettings {
     double density = 0.15;  // [kg/m^3] of the guides' own mass
     double pressure = 0.05; // [m^2/s^2] k_p
     double drag = 3;        // [1/s] c_v
-    double limit = 50;      // [m/s^2] largest acceleration by pressure along an axis
+    double limit = 50;      // [m/s^2] largest push along an axis: p_max / h
 };
 
 class HairGrid final : public Neighbours {
@@ -60,12 +58,13 @@ class HairGrid final : public Neighbours {
     Box groomed;                 // where there is hair at rest
     std::vector<double> densest; // L on those nodes
     double lowest[3], highest[3]; // how far strands reach, in cells
+    int S, P;
 
-    HairGrid(const RestShape &rest, const GridSettings &given) : settings(given), S_(rest.S), P_(rest.P) {
+    HairGrid(const RestShape &rest, const GridSettings &given) : settings(given), S(rest.S), P(rest.P) {
         double longest = 0;
-        for (int s = 0; s < S_; ++s) {
+        for (int s = 0; s < S; ++s) {
             double length = 0;
-            for (int j = 0; j + 1 < P_; ++j) length += rest.length[size_t(s) * (P_ - 1) + j];
+            for (int j = 0; j + 1 < P; ++j) length += rest.length[size_t(s) * (P - 1) + j];
             longest = std::max(longest, length);
         }
         double low[3], high[3];
@@ -90,13 +89,11 @@ class HairGrid final : public Neighbours {
         return product;
     }
 
-    bool fits(int S, int P) const override { return S == S_ && P == P_; }
+    bool fits(int strands, int points) const override { return strands == S && points == P; }
     std::unique_ptr<NeighbourForce<float>> start(float) const override;
     std::unique_ptr<NeighbourForce<double>> start(double) const override;
 
   private:
-    int S_, P_;
-
     void measure_groom(const RestShape &rest, const Box &box) {
         groomed = box;
         densest.assign(box.size(), 0);
@@ -130,27 +127,23 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
     static constexpr Real kNowhere = Real(-1e9); // place of a lane that takes no part
 
   public:
-    explicit GridForce(const HairGrid &grid) : grid_(grid), settings_(grid.settings), turn_(identity()) {}
+    explicit GridForce(const HairGrid &grid)
+        : grid_(grid), settings_(grid.settings), turn_(identity()), ranges_(block_count<Real>(grid.S)),
+          places_(ranges_.size() * grid.P) {}
+
+    void see(const Resident<Real> &block, int number, const Pose &head) override {
+        place(block, number, Rigid<Real>(head.inverse()));
+    }
 
     void look(const std::vector<Resident<Real>> &blocks, const Pose &head, double) override {
-        const int count = int(blocks.size());
 #pragma omp single
         {
             turn_ = Rigid<Real>(head);
-            ranges_.resize(count);
-            places_.resize(count * size_t(blocks[0].block.P));
+            enclose();
         }
-        const Rigid<Real> local(head.inverse());
-#pragma omp for schedule(static)
-        for (int b = 0; b < count; ++b) place(blocks[b], b, local);
-#pragma omp single
-        enclose();
         const int slabs = int(slabs_.size()) - 1;
 #pragma omp for schedule(dynamic, 1)
         for (int slab = 0; slab < slabs; ++slab) spread(blocks, slabs_[slab], slabs_[slab + 1]);
-#pragma omp for schedule(dynamic, 2)
-        for (int y = 1; y < box_.n[1] - 1; ++y)
-            for (int z = 1; z < box_.n[2] - 1; ++z) push_row(y * box_.n[2] + z);
     }
 
     void act(Resident<Real> &block, int number) override {
@@ -160,8 +153,8 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
             const Around around(places_[number * size_t(P) + i], box_);
             Real a[3][kLanes<Real>];
             for (int lane = 0; lane < kLanes<Real>; ++lane) {
-                const Four mean = around.mean(lane, nodes_.data(), box_);
-                for (int axis = 0; axis < 3; ++axis) a[axis][lane] = mean[axis + 1];
+                const Four force = around.force(lane, nodes_.data(), box_);
+                for (int axis = 0; axis < 3; ++axis) a[axis][lane] = force[axis + 1];
             }
             Vec3<Real> local;
             __builtin_memcpy(&local, a, sizeof local);
@@ -178,26 +171,35 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
 
     /// The cell of each lane's place and its place there.
     struct Around {
-        M nowhere, y, at;     // takes no part; layer and index of the cell's first node
-        L fx, w00, w01, w10, w11; // weight of the upper x; weights along y, z
+        M nowhere, y, at; // takes no part; layer and index of the cell's first node
+        Vec3<Real> f;     // place in the cell, 0 .. 1
 
         Around(Vec3<Real> place, const Box &box) : nowhere(place.y <= kNowhere) {
-            const Vec3<Real> inside = select(nowhere, Vec3<Real>{}, place - corner(box));
-            const M x = __builtin_convertvector(inside.x, M), z = __builtin_convertvector(inside.z, M);
-            y = __builtin_convertvector(inside.y, M);
-            at = (y * box.n[2] + z) * box.n[0] + x;
-            fx = inside.x - __builtin_convertvector(x, L);
-            const L fy = inside.y - __builtin_convertvector(y, L), fz = inside.z - __builtin_convertvector(z, L);
-            w00 = (1 - fy) * (1 - fz), w01 = (1 - fy) * fz, w10 = fy * (1 - fz), w11 = fy * fz;
+            M x, z;
+            below(place.x, x, f.x), below(place.y, y, f.y), below(place.z, z, f.z);
+            x -= box.low[0], y -= box.low[1], z -= box.low[2];
+            at = nowhere ? M{} : (y * box.n[2] + z) * box.n[0] + x;
         }
 
-        RINGLET_INLINE Four mean(int lane, const Node *nodes, const Box &box) const {
+        /// Whole cells and the rest, which does not depend on the box.
+        static RINGLET_INLINE void below(L place, M &whole, L &rest) {
+            whole = __builtin_convertvector(place, M);
+            whole += __builtin_convertvector(whole, L) > place; // truncation to floor: a true comparison is -1
+            rest = place - __builtin_convertvector(whole, L);
+        }
+
+        /// From pressure over h and c_v V at the nodes: in 1 to 3, their force.
+        RINGLET_INLINE Four force(int lane, const Node *nodes, const Box &box) const {
             const Node *node = nodes + at[lane];
-            Eight sum = w00[lane] * pair(node) + w01[lane] * pair(node + box.row());
-            sum += w10[lane] * pair(node + box.layer()) + w11[lane] * pair(node + box.layer() + box.row());
-            const Four low = __builtin_shufflevector(sum, sum, 0, 1, 2, 3);
-            const Four high = __builtin_shufflevector(sum, sum, 4, 5, 6, 7);
-            return low + fx[lane] * (high - low);
+            const Real fx = f.x[lane], fy = f.y[lane], fz = f.z[lane];
+            const Eight low = pair(node), high = pair(node + box.layer());
+            const Eight dz_low = pair(node + box.row()) - low, dz_high = pair(node + box.layer() + box.row()) - high;
+            const Eight at_low = low + fz * dz_low, dy = high + fz * dz_high - at_low, all = at_low + fy * dy;
+            const Eight dz = dz_low + fy * (dz_high - dz_low);
+            const Four first = __builtin_shufflevector(all, all, 0, 1, 2, 3);
+            const Four dx = __builtin_shufflevector(all, all, 4, 5, 6, 7) - first;
+            const Four slope = {0, dx[0], dy[0] + fx * (dy[4] - dy[0]), dz[0] + fx * (dz[4] - dz[0])};
+            return first + fx * dx - slope;
         }
     };
 
@@ -208,16 +210,10 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
     std::vector<Range> ranges_;
     std::vector<Vec3<Real>> places_; // of every point, in cells
     std::vector<int> slabs_;         // first layers of what one thread fills at a time
-    std::vector<Node> nodes_;        // density and momentum, then density and A
-    std::vector<Real> density_, excess_; // rho and rho / L - 1 of a node
-    std::vector<Real> let_pass_, per_let_pass_;
-    std::vector<uint8_t> pushes_; // whether any node of a row has an excess
+    std::vector<Node> nodes_;        // density and momentum, then pressure over h and c_v V
+    std::vector<Real> per_let_pass_; // 1 / L
 
     static Pose identity() { return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}}; }
-
-    static Vec3<Real> corner(const Box &box) {
-        return {splat(Real(box.low[0])), splat(Real(box.low[1])), splat(Real(box.low[2]))};
-    }
 
     static RINGLET_INLINE Eight pair(const Node *node) {
         Eight both;
@@ -263,13 +259,9 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
         const Box tight = Box::around(low, high);
         Box roomy = tight;
         for (int axis = 0; axis < 3; ++axis) roomy.low[axis] -= 1, roomy.n[axis] += 2;
-        roomy.n[0] = (roomy.n[0] + kLanes<float> - 1) / kLanes<float> * kLanes<float>; // whole lanes in a row
         if (box_.contains(tight) && 2 * box_.size() < 3 * roomy.size()) return;
         box_ = roomy;
         nodes_.resize(box_.size());
-        density_.resize(box_.size());
-        excess_.resize(box_.size());
-        pushes_.resize(size_t(box_.n[1]) * box_.n[2]);
         fill_let_pass();
         const int layers = box_.n[1], slabs = std::min(layers, kSlabs);
         slabs_.clear();
@@ -280,8 +272,7 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
 
     void fill_let_pass() {
         const Box &rest = grid_.groomed;
-        let_pass_.assign(box_.size(), Real(settings_.density));
-        per_let_pass_.resize(box_.size());
+        per_let_pass_.assign(box_.size(), Real(1 / settings_.density));
         for (int y = 0; y < rest.n[1]; ++y)
             for (int z = 0; z < rest.n[2]; ++z)
                 for (int x = 0; x < rest.n[0]; ++x) {
@@ -290,10 +281,9 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
                     bool inside = true;
                     for (int axis = 0; axis < 3; ++axis) inside = inside && to[axis] >= 0 && to[axis] < box_.n[axis];
                     if (inside)
-                        let_pass_[to[1] * box_.layer() + to[2] * box_.row() + to[0]] =
-                            Real(grid_.densest[y * rest.layer() + z * rest.row() + x]);
+                        per_let_pass_[to[1] * box_.layer() + to[2] * box_.row() + to[0]] =
+                            Real(1 / grid_.densest[y * rest.layer() + z * rest.row() + x]);
                 }
-        for (size_t k = 0; k < let_pass_.size(); ++k) per_let_pass_[k] = 1 / let_pass_[k];
     }
 
     /// Gives mass and momentum of all points to the nodes of the layers first .. last - 1.
@@ -318,19 +308,18 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
                 }
             }
         }
-        for (int row = first * box_.n[2]; row < last * box_.n[2]; ++row) measure_row(row);
+        for (size_t k = first * box_.layer(); k < last * box_.layer(); ++k) press(k);
     }
 
-    /// Density and excess of a row of nodes.
-    void measure_row(int row) {
-        const size_t begin = row * box_.row(), end = begin + box_.row();
-        Real most = -1;
-        for (size_t k = begin; k < end; ++k) {
-            density_[k] = nodes_[k].v[0];
-            excess_[k] = density_[k] * per_let_pass_[k] - 1;
-            most = excess_[k] > most ? excess_[k] : most;
-        }
-        pushes_[row] = most > 0;
+    /// From density and momentum to pressure over h and c_v V.
+    RINGLET_INLINE void press(size_t k) {
+        Four &node = nodes_[k].v;
+        const Real rho = node[0];
+        if (!(rho > 0)) return;
+        const Real drag = Real(settings_.drag) / rho, most = Real(settings_.limit);
+        const Real p = Real(settings_.pressure / settings_.cell) * (rho * per_let_pass_[k] - 1);
+        node = Four{0, drag, drag, drag} * node;
+        node[0] = p > 0 ? (p < most ? p : most) : 0;
     }
 
     Pose inverse_turn() const {
@@ -341,63 +330,26 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
     }
 
     RINGLET_INLINE void give(const Around &around, int lane, Four all, bool lower, bool upper) {
-        const Four high = around.fx[lane] * all, low = all - high;
+        const Four high = around.f.x[lane] * all, low = all - high;
         const Eight share = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+        const Real fz = around.f.z[lane];
+        const Eight above = around.f.y[lane] * share, below = share - above;
         Node *node = nodes_.data() + around.at[lane];
         if (lower) {
-            add(node, around.w00[lane] * share);
-            add(node + box_.row(), around.w01[lane] * share);
+            const Eight far = fz * below;
+            add(node, below - far);
+            add(node + box_.row(), far);
         }
         if (upper) {
-            add(node + box_.layer(), around.w10[lane] * share);
-            add(node + box_.layer() + box_.row(), around.w11[lane] * share);
+            const Eight far = fz * above;
+            add(node + box_.layer(), above - far);
+            add(node + box_.layer() + box_.row(), far);
         }
     }
 
     static RINGLET_INLINE void add(Node *node, Eight share) {
         const Eight sum = pair(node) + share;
         __builtin_memcpy(node, &sum, sizeof sum);
-    }
-
-    /// From density and momentum to density and A, for a row of nodes.
-    void push_row(int row) {
-        const size_t begin = row * box_.row();
-        const int n = box_.n[0];
-        std::vector<Real> &force = row_memory(4 * size_t(n));
-        const bool pushed = pushes_[row] || pushes_[row - 1] || pushes_[row + 1] || pushes_[row - box_.n[2]] ||
-                            pushes_[row + box_.n[2]];
-        const size_t strides[3] = {1, box_.layer(), box_.row()};
-        for (int axis = 0; axis < 3 && pushed; ++axis) face_forces(begin, strides[axis], force.data() + axis * n);
-        if (!pushed) std::fill_n(force.begin(), 3 * n, Real(0));
-        const Real per_cell = Real(1 / settings_.cell), drag = Real(settings_.drag);
-        Real *inverse = force.data() + 3 * n;
-#pragma omp simd
-        for (int x = 0; x < n; ++x) inverse[x] = 1 / density_[begin + x];
-        for (int x = 0; x < n; ++x) {
-            if (!(density_[begin + x] > 0)) continue;
-            Four &node = nodes_[begin + x].v;
-            node = (per_cell * Four{0, force[x], force[n + x], force[2 * n + x]} + drag * node) * inverse[x];
-        }
-    }
-
-    static std::vector<Real> &row_memory(size_t count) {
-        thread_local std::vector<Real> memory;
-        memory.resize(count);
-        return memory;
-    }
-
-    /// Difference of the pressures on the two faces along an axis, for a row of nodes.
-    void face_forces(size_t begin, size_t stride, Real *force) const {
-        const Real *rho = density_.data() + begin, *e = excess_.data() + begin, *pass = let_pass_.data() + begin;
-        const Real k = Real(settings_.pressure / 2), most = Real(settings_.limit * settings_.cell / (2 * settings_.pressure));
-        const auto s = ptrdiff_t(stride), n = ptrdiff_t(box_.n[0]);
-        const auto face = [=](ptrdiff_t a, ptrdiff_t b) {
-            const Real less = rho[a] < rho[b] ? rho[a] : rho[b], mean = Real(0.5) * (pass[a] + pass[b]);
-            const Real both = Real(0.5) * (e[a] + e[b]), excess = both > 0 ? (both < most ? both : most) : 0;
-            return k * excess * (less + (less < mean ? less : mean));
-        };
-#pragma omp simd
-        for (ptrdiff_t x = 0; x < n; ++x) force[x] = face(x - s, x) - face(x, x + s);
     }
 };
 

@@ -48,18 +48,21 @@ template <class Real> struct Resident {
           phi(arena.take<Lanes<Real>>(P)) {}
 
     /// Bytes that a Resident takes from its arena.
-    static size_t bytes(int P) { return sizeof(Lanes<Real>) * 64 * (size_t(P) + 2); }
+    static size_t bytes(int P) { return sizeof(Lanes<Real>) * 96 * (size_t(P) + 2); }
 };
 
-/// A method at work in one call of `advance`. Both functions are called by every thread of a parallel region.
+/// A method at work in one call of `advance`: in every step it sees each block, looks at all, and acts on each.
 template <class Real> class NeighbourForce {
   public:
     virtual ~NeighbourForce() = default;
 
-    /// Looks at all strands at the start of a step; head: its pose there. Work is shared among the threads.
+    /// Reads a block where a step starts; head: its pose there. Blocks may come in any order and thread.
+    virtual void see(const Resident<Real> &block, int number, const Pose &head) = 0;
+
+    /// Works out what all strands do, at the same pose. Called by every thread of a parallel region, which share it.
     virtual void look(const std::vector<Resident<Real>> &blocks, const Pose &head, double theta_dt) = 0;
 
-    /// The force on a block, after `look`.
+    /// Writes the force on a block. Blocks may come in any order and thread.
     virtual void act(Resident<Real> &block, int number) = 0;
 };
 

@@ -8,6 +8,7 @@
 #include "advance.hpp"
 #include "neighbours.hpp"
 
+#include <algorithm>
 #include <chrono>
 
 namespace ringlet {
@@ -26,6 +27,9 @@ class Clock {
     static std::chrono::steady_clock::time_point now() { return std::chrono::steady_clock::now(); }
 };
 
+/// Fewer blocks than this do not pay a thread that waits for the others three times a step.
+inline constexpr int kBlocksForThread = 4;
+
 /// The blocks of a state in lanes; every block's memory is its own.
 template <class Real> class Together {
   public:
@@ -36,13 +40,14 @@ template <class Real> class Together {
             blocks_.emplace_back(arena_, rest.P, BlockIndex<Real>(b, rest.S));
     }
 
-    Report advance(const DistanceField *field, NeighbourForce<Real> &force, int threads) {
+    Report advance(const DistanceField *field, NeighbourForce<Real> &force, int most_threads) {
+        const int threads = std::clamp(int(blocks_.size()) / kBlocksForThread, 1, most_threads);
         double looking = 0, acting = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : acting)
         {
             Arena arena(Stepper<Real>::bytes(rest_.P));
             Stepper<Real> stepper(arena, rest_.P, settings_, field);
-            read_blocks(stepper);
+            read_blocks(stepper, force);
             double look = 0;
             for (int k = 0; k < drive_.steps; ++k) {
                 {
@@ -70,7 +75,7 @@ template <class Real> class Together {
     Arena arena_;
     std::vector<Resident<Real>> blocks_;
 
-    void read_blocks(Stepper<Real> &stepper) {
+    void read_blocks(Stepper<Real> &stepper, NeighbourForce<Real> &force) {
 #pragma omp for schedule(static)
         for (int b = 0; b < int(blocks_.size()); ++b) {
             Resident<Real> &resident = blocks_[b];
@@ -79,6 +84,7 @@ template <class Real> class Together {
             stepper.exchange(resident);
             stepper.contacts.forget(rest_.P);
             stepper.exchange(resident);
+            force.see(resident, b, drive_.head[0]);
         }
     }
 
@@ -99,6 +105,8 @@ template <class Real> class Together {
             stepper.step(interval, own_lanes(resident.index));
             stepper.exchange(resident);
             tallies_[b] = stepper.tally;
+            const Clock clock(acting);
+            force.see(resident, b, drive_.head[k + 1]);
         }
     }
 
@@ -119,6 +127,7 @@ void neighbour_acceleration(StateArrays<Real> state, const RestShape &rest, Neig
         residents.emplace_back(arena, rest.P, BlockIndex<Real>(b, rest.S));
         read(residents[b].block, rest, residents[b].index);
         read(residents[b].now, state, rest.P, residents[b].index);
+        force.see(residents[b], b, head);
     }
 #pragma omp parallel num_threads(threads)
     {

@@ -140,3 +140,20 @@ def copy(state: kernels.State) -> kernels.State:
 def same(a: kernels.State, b: kernels.State) -> bool:
     """Whether two states are equal to the last bit."""
     return all(getattr(a, name).tobytes() == getattr(b, name).tobytes() for name in ARRAYS)
+
+
+def bundle(strand: Points, precision: type = np.float64) -> tuple[kernels.RestShape, kernels.State]:
+    """37 strands that hang from roots 7 mm apart on a hexagon, each turned about its axis, at their rest shape."""
+    places = [(x + y / 2, y * 0.75**0.5) for y in range(-3, 4) for x in range(-3, 4) if abs(x + y) <= 3]
+    hanging = strand @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    strands = [
+        hanging @ rotation((0, 1, 0), 2.4 * k).T + [7e-3 * x, 0, 7e-3 * z] for k, (x, z) in enumerate(places)
+    ]
+    points = np.array(strands)
+    return shape(points), kernels.at_rest(points.astype(precision))
+
+
+def width(state: kernels.State) -> float:
+    """Width [m] of a hanging bundle: twice the root mean square distance of the lower half from its middle, x sqrt 2."""
+    lower = state.points[:, state.points.shape[1] // 2 :, [0, 2]].astype(float)
+    return float(2 * np.sqrt(2) * np.sqrt(((lower - lower.mean((0, 1))) ** 2).sum(-1).mean()))

@@ -54,19 +54,58 @@ def stirred(count: int, precision: type) -> Head:
     return rest, state
 
 
-@pytest.mark.parametrize(("precision", "rounding"), [(np.float64, 1e-14), (np.float32, 1e-6)])
-def test_the_grid_conserves_momentum(precision: type, rounding: float) -> None:
+@pytest.mark.parametrize(("precision", "rounding"), [(np.float64, 1e-15), (np.float32, 1e-7)])
+def test_blending_velocities_conserves_momentum(precision: type, rounding: float) -> None:
     rest, state = stirred(70, precision)
-    head = turned((1, 2, 3), 0.7)
-    for part in ({"pressure": 0.0}, {"drag": 0.0}, {}):
-        a = kernels.neighbour_acceleration(state, rest, grid(rest, density=0.01, **part), head, settings())
-        force = rest.mass[..., None] * a
-        net = np.abs(force.sum((0, 1))).max() / np.abs(force).sum()
-        print(
-            f"{precision.__name__} {part or 'all'}: net force {net:.1e} of the sum of all, up to {np.abs(a).max():.1f} m/s^2"
-        )
-        assert np.abs(a).max() > 1
-        assert net <= rounding
+    blending = grid(rest, density=0.01, pressure=0.0)
+    a = kernels.neighbour_acceleration(state, rest, blending, turned((1, 2, 3), 0.7), settings())
+    force = rest.mass[..., None] * a
+    net = np.abs(force.sum((0, 1))).max() / np.abs(force).sum()
+    print(f"{precision.__name__}: net force {net:.1e} of the sum of all, up to {np.abs(a).max():.1f} m/s^2")
+    assert np.abs(a).max() > 1
+    assert net <= rounding
+
+
+def energy(points: Points, rest: kernels.RestShape, density: float, cell: float, pressure: float) -> float:
+    """sum h^3 k_p max(0, rho - L)^2 / (2 L) over the nodes, written anew with numpy."""
+    low = np.floor(np.minimum(points, rest.points).min((0, 1)) / cell).astype(int)
+    high = np.floor(np.maximum(points, rest.points).max((0, 1)) / cell).astype(int) + 2
+
+    def densities(at: Points) -> Points:
+        rho = np.zeros(high - low)
+        place = at.reshape(-1, 3) / cell - low
+        first, mass = np.floor(place).astype(int), rest.mass.ravel() / cell**3
+        for corner in np.ndindex(2, 2, 2):
+            weight = np.abs(1 - np.array(corner) - (place - first)).prod(-1)
+            np.add.at(rho, tuple((first + corner).T), weight * mass)
+        return rho
+
+    allowed = np.maximum(densities(rest.points), density)
+    over = np.maximum(densities(points) - allowed, 0)
+    return float((pressure * over**2 / (2 * allowed)).sum() * cell**3)
+
+
+def test_the_push_is_the_gradient_of_an_energy_and_nearly_keeps_momentum() -> None:
+    rest, state = stirred(70, np.float64)
+    values = {"density": 0.01, "cell": 8e-3, "pressure": 0.05}
+    a = kernels.neighbour_acceleration(
+        state, rest, grid(rest, drag=0.0, limit=1e9, **values), np.eye(4), settings()
+    )
+    errors = []
+    for s, i, axis in [(3, 10, 0), (20, 20, 1), (51, 5, 2), (69, 31, 0), (33, 16, 2)]:
+        sides = []
+        for step in (1e-7, -1e-7):
+            moved = state.points.copy()
+            moved[s, i, axis] += step
+            sides.append(energy(moved, rest, **values))
+        expected = -(sides[0] - sides[1]) / 2e-7 / rest.mass[s, i]
+        errors.append(abs(a[s, i, axis] - expected) / np.abs(a).max())
+    force = rest.mass[..., None] * a
+    net = np.abs(force.sum((0, 1))).max() / np.abs(force).sum()
+    print(f"force against gradient: {max(errors):.1e} of the largest; net force {net:.1e} of the sum of all")
+    assert np.abs(a).max() > 10
+    assert max(errors) < 1e-5
+    assert net < 0.03
 
 
 def test_hair_is_pushed_from_where_it_is_dense_to_where_it_is_not(straight: Points) -> None:
@@ -135,18 +174,22 @@ def test_the_push_has_a_limit() -> None:
     assert pushes[1] < pushes[2]
 
 
-@pytest.mark.parametrize(("curl", "alone", "together"), [("curly", 47.9, 57.0), ("wavy", 30.0, 40.0)])
-def test_a_bundle_keeps_its_width(curl: str, alone: float, together: float) -> None:
-    """37 guides that hang from roots 7 mm apart, 3 s; the widths of the reference are those of its table."""
+@pytest.mark.parametrize("hair", ["curly, hanging", "straight, from the side"])
+def test_a_bundle_keeps_its_width(hair: str) -> None:
+    """37 guides from roots 7 mm apart come to rest, and wider than without neighbours (contact.md: 48 and 57 mm)."""
+    strand = helix(0.008, 0.02, 0.25, 32) if "curly" in hair else np.linspace([0.0, 0, 0], [0.25, 0, 0], 32)
+    head = np.eye(4) if "hanging" in hair else turned((0, 0, 1), np.pi / 2)
     found = {}
-    for name, make in {"none": lambda _: None, "grid": grid}.items():
-        rest, state = bundle(curl)
-        kernels.advance(state, rest, None, drive(720), settings(), make(rest))
+    for name in ("none", "grid"):
+        rest, _ = bundle(strand)
+        state = kernels.at_rest(np.ascontiguousarray(rest.points @ head[:3, :3].T))
+        neighbours = grid(rest) if name == "grid" else None
+        kernels.advance(state, rest, None, drive(960, lambda _: head), settings(), neighbours)
         found[name] = width(state)
         speed = np.sqrt((state.velocity**2).sum(-1).mean())
-        print(f"{curl} {name}: width {found[name]:.1f} mm, rms speed {speed * 1e3:.2f} mm/s")
-        assert speed < 0.01
-    assert found["grid"] > found["none"] + 5
+        print(f"{hair}, {name}: width {found[name] * 1e3:.1f} mm, rms speed {speed * 1e3:.2f} mm/s")
+        assert speed < 1e-3
+    assert found["grid"] > found["none"] + 6e-3
 
 
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
@@ -154,7 +197,7 @@ def test_result_does_not_depend_on_the_number_of_threads(precision: type) -> Non
     results = []
     for threads in (1, 2, 3):
         kernels.set_threads(threads)
-        rest, state = curly_head(70, precision)
+        rest, state = curly_head(200, precision)
         kernels.advance(
             state, rest, sphere(), drive(48, shake(1 / 240)), settings(), grid(rest, density=0.02)
         )
