@@ -84,6 +84,8 @@ class RestShape:
     """(S, P-3): rho, the ratio of the rest sin-bends at the two ends of segments 1 .. P-3."""
     weight: _F64
     """(S, P-3) [N m]: G, the stiffness of "rotor" about segments 1 .. P-3; fades to 0 where the strand is straight."""
+    root_weight: _F64
+    """(S,) [N m]: the same about segment 0 where the head holds points 0 and 1; 0 lets a curl swivel about its root."""
     held: NDArray[np.uint8]
     """(S, P): 0 free, 1 carried by the head's pose, 2 carried by the hand's pose. Any points may be held."""
     offset: _F64
@@ -128,8 +130,12 @@ def bending(points: _F64, rest: RestShape) -> tuple[_F64, _F64]:
 def torsion_frenet(points: _F64, rest: RestShape) -> tuple[_F64, _F64]:
     """Energy (S,) [J] and force (S, P, 3) [N] of the lecture's torsion, regularised with eps = 0.3 dl."""
 
-def torsion_rotor(points: _F64, rest: RestShape) -> tuple[_F64, _F64]:
-    """Energy (S,) [J] and force (S, P, 3) [N] of the 4-point polynomial torsion with one minimum."""
+def torsion_rotor(points: _F64, rest: RestShape, directors: _F64 | None = None) -> tuple[_F64, _F64]:
+    """Energy (S,) [J] and force (S, P, 3) [N] of the 4-point polynomial torsion with one minimum.
+
+    With directors (S, P-1, 3) float64 of the segments, also that of clamped roots, which keep the direction of their
+    first bend.
+    """
 
 def kirchhoff(
     points: _F64, directors: _F64, rest: RestShape, twist: _F64 | None = None

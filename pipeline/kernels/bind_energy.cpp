@@ -2,6 +2,7 @@
 #include "bindings.hpp"
 
 #include "energy.hpp"
+#include "root.hpp"
 #include "twist.hpp"
 #include "operators.hpp"
 
@@ -41,25 +42,36 @@ static void check_fits(const Points &points, const RestShape &rest) {
             "points: expected (S, P, 3) of the rest shape");
 }
 
-using Energy = Lanes<double> (*)(const Block<double> &, Edges<double> &);
+using Vectors = Array<const double, -1, -1, 3>;
 
-/// Energy of every strand, and its force.
-static std::tuple<Doubles, Doubles> energy_and_force(Energy energy, const Points &points, const RestShape &rest) {
+static void check_directors(const Points &points, const Vectors &directors) {
+    require(points.shape(1) >= 3, "points: expected at least 3 points a strand");
+    require(directors.shape(0) == points.shape(0) && directors.shape(1) + 1 == points.shape(1),
+            "directors: expected (S, P-1, 3) for the points");
+}
+
+/// Energy of every strand, and its force. Without directors no root is clamped.
+template <class Energy>
+static std::tuple<Doubles, Doubles> energy_and_force(Energy energy, const Points &points, const RestShape &rest,
+                                                     const std::optional<Vectors> &directors = std::nullopt) {
     check_fits(points, rest);
+    if (directors) check_directors(points, *directors);
     const int P = rest.P;
     auto values = new_array<double>({size_t(rest.S)});
     auto forces = new_array<double>({size_t(rest.S), size_t(P), 3});
     Arena arena(sizeof(Lanes<double>) * 64 * (P + 8));
     Block<double> block(arena, P);
     Edges<double> edges(arena, P);
-    auto *x = arena.take<Vec3<double>>(P), *f = arena.take<Vec3<double>>(P);
+    auto *x = arena.take<Vec3<double>>(P), *f = arena.take<Vec3<double>>(P), *m = arena.take<Vec3<double>>(P);
     for (int k = 0; k < block_count<double>(rest.S); ++k) {
         BlockIndex<double> index(k, rest.S);
         read(block, rest, index);
         gather(x, points.data(), P, index.strand);
+        if (directors) gather(m, directors->data(), P - 1, index.strand);
+        else block.clamped = false;
         edges.set(x, P);
         for (int i = 0; i < P; ++i) f[i] = Vec3<double>{};
-        Lanes<double> E = energy(block, edges);
+        Lanes<double> E = energy(block, m, edges);
         add_edge_forces(edges, P, f);
         scatter(&E, values.data(), 1, index);
         scatter(f, forces.data(), P, index);
@@ -67,14 +79,7 @@ static std::tuple<Doubles, Doubles> energy_and_force(Energy energy, const Points
     return {values, forces};
 }
 
-using Vectors = Array<const double, -1, -1, 3>;
 using Twist = std::optional<Array<const double, -1, -1>>;
-
-static void check_directors(const Points &points, const Vectors &directors) {
-    require(points.shape(1) >= 3, "points: expected at least 3 points a strand");
-    require(directors.shape(0) == points.shape(0) && directors.shape(1) + 1 == points.shape(1),
-            "directors: expected (S, P-1, 3) for the points");
-}
 
 /// Directors without twist.
 static Doubles untwisted(const Points &points) {
@@ -173,6 +178,7 @@ static RestShape rest_shape(Points points, Array<const double, -1> mass_per_leng
     rest.length.resize(S * (P - 1)), rest.mass.resize(S * P);
     rest.curvature.resize(S * (P - 2)), rest.torsion.resize(S * (P - 4));
     rest.dihedral.resize(S * (P - 3)), rest.ratio.resize(S * (P - 3)), rest.weight.resize(S * (P - 3));
+    rest.root_weight.resize(S);
     for (int s = 0; s < rest.S; ++s) derive_strand(rest, s, mass_per_length.data()[s], kappa_0);
     const Doubles directors = untwisted(points);
     rest.bending_2 = rest.bending, rest.load.resize(S * P * 3);
@@ -220,6 +226,7 @@ static void bind_rest(nb::module_ &m) {
     property<&RestShape::dihedral, 3>(cls, "dihedral");
     property<&RestShape::ratio, 3>(cls, "ratio");
     property<&RestShape::weight, 3>(cls, "weight");
+    property<&RestShape::root_weight, -1>(cls, "root_weight");
     property<&RestShape::held, 0>(cls, "held");
     property<&RestShape::offset, 0>(cls, "offset");
     m.def("rest_shape", &rest_shape, nb::arg("points"), nb::arg("mass_per_length"), nb::arg("bending"),
@@ -235,14 +242,17 @@ void bind_energy(nb::module_ &m) {
         return apply(&torsion, points, form, 4, "points: torsion needs 5 points a strand");
     }, nb::arg("points"), nb::arg("form"));
     m.def("bending", [](Points points, const RestShape &rest) {
-        return energy_and_force(&add_bending<double>, points, rest);
+        auto energy = [](auto &block, auto *, auto &edges) { return add_bending(block, edges); };
+        return energy_and_force(energy, points, rest);
     }, nb::arg("points"), nb::arg("rest"));
     m.def("torsion_frenet", [](Points points, const RestShape &rest) {
-        return energy_and_force(&add_frenet<double>, points, rest);
+        auto energy = [](auto &block, auto *, auto &edges) { return add_frenet(block, edges); };
+        return energy_and_force(energy, points, rest);
     }, nb::arg("points"), nb::arg("rest"));
-    m.def("torsion_rotor", [](Points points, const RestShape &rest) {
-        return energy_and_force(&add_rotor<double>, points, rest);
-    }, nb::arg("points"), nb::arg("rest"));
+    m.def("torsion_rotor", [](Points points, const RestShape &rest, std::optional<Vectors> directors) {
+        auto energy = [](auto &block, auto *m, auto &edges) { return add_torsion(Torsion::rotor, block, m, edges); };
+        return energy_and_force(energy, points, rest, directors);
+    }, nb::arg("points"), nb::arg("rest"), nb::arg("directors") = nb::none());
     m.def("kirchhoff", &rod_energy, nb::arg("points"), nb::arg("directors"), nb::arg("rest"),
           nb::arg("twist") = nb::none());
     m.def("untwisted_directors", &untwisted, nb::arg("points"));

@@ -195,7 +195,7 @@ static void block_energies(const Block<double> &b, const Motion<double> &at, con
         energy[0] = rod.bending, energy[1] = rod.twisting;
     } else {
         energy[0] = add_bending(b, edges);
-        energy[1] = add_torsion(settings.torsion, b, edges);
+        energy[1] = add_torsion(settings.torsion, b, at.m, edges);
     }
     energy[2] = energy[3] = Lanes<double>{};
     for (int i = 0; i < b.P; ++i) {

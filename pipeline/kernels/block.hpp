@@ -56,9 +56,11 @@ template <class Real> struct Block {
     int P;
     int first = 0;            // points before this one are held in every lane
     bool held_inside = false; // some lane holds a point after that
+    bool clamped = false;     // some lane has a root_weight
     Lanes<Real> k_kappa, k_tau, m0, per_mass; // per_mass = 1 / m0
     Lanes<Real> k_kappa_2, k_ratio, inverse_ratio; // "kirchhoff": B2, B2 / B1, B1 / B2
     Vec3<Real> *anchor;                 // rest position of a point
+    Lanes<Real> root_bend[2], root_weight;    // root.hpp; weight 0 unless the head holds points 0 and 1
     Vec3<Real> *load;                   // constant force on a point over m0
     Vec3<Real> *director, *strain;      // "kirchhoff": of segment j; (r1, r2, r3) at point i
     Lanes<Real> *turns;                 // 1 where the director of segment j is free: not both its ends are held
@@ -132,6 +134,20 @@ void scatter(const Vec3<Real> *from, T *target, int count, const BlockIndex<Real
     }
 }
 
+/// The bend that a clamped root keeps: the second segment seen in the frame of the first, at rest.
+template <class Real> void derive_root(Block<Real> &b) {
+    Vec3<Real> d[2];
+    for (int j = 0; j < 2; ++j) {
+        const Vec3<Real> edge = b.anchor[j + 1] - b.anchor[j];
+        d[j] = inverse_root<Real>(dot(edge, edge)) * edge;
+    }
+    b.root_bend[0] = dot(d[1], b.director[0]);
+    b.root_bend[1] = dot(d[1], cross(d[0], b.director[0]));
+    const Mask<Real> by_head = (b.free[0] + b.free[1] + b.hand[0] + b.hand[1]) < Real(1);
+    b.root_weight = select<Real>(by_head, b.root_weight, splat(Real(0)));
+    b.clamped = any<Real>(b.root_weight > 0);
+}
+
 /// Masses and held points in the form that the step uses.
 template <class Real> void derive(Block<Real> &b, const RestShape &rest, const int (&strand)[kLanes<Real>]) {
     const Lanes<Real> one = splat(Real(1)), none = splat(Real(0));
@@ -177,6 +193,7 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
     const Lanes<Real> one = splat(Real(1));
     b.k_ratio = select<Real>(b.k_kappa > 0, b.k_kappa_2 / b.k_kappa, one);
     b.inverse_ratio = select<Real>(b.k_kappa_2 > 0, b.k_kappa / b.k_kappa_2, one);
+    gather<Real>(&b.root_weight, rest.root_weight.data(), 1, 1, strand);
     gather(b.load, rest.load.data(), P, strand);
     gather(b.director, rest.directors.data(), P - 1, strand);
     gather(b.strain + 1, rest.strain.data(), P - 2, strand);
@@ -187,6 +204,7 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
             b.root[i][lane] = std::sqrt(b.root[i][lane]), b.inverse_root[i][lane] = 1 / b.root[i][lane];
         }
     derive(b, rest, strand);
+    derive_root(b);
 }
 
 } // namespace ringlet

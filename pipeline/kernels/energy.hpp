@@ -169,10 +169,4 @@ template <class Real> Lanes<Real> add_frenet(const Block<Real> &b, Edges<Real> &
     return energy;
 }
 
-template <class Real> Lanes<Real> add_torsion(Torsion torsion, const Block<Real> &b, Edges<Real> &edges) {
-    if (torsion == Torsion::rotor) return add_rotor(b, edges);
-    if (torsion == Torsion::frenet) return add_frenet(b, edges);
-    return Lanes<Real>{};
-}
-
 } // namespace ringlet

@@ -48,7 +48,7 @@ void steady_forces(const Block<Real> &b, const StepSettings &settings, const Mot
         add_rod(b, from.m, from.twist, edges);
     } else {
         add_bending(b, edges);
-        add_torsion(settings.torsion, b, edges);
+        add_torsion(settings.torsion, b, from.m, edges);
     }
     Vec3<Real> before{};
     for (int j = 0; j < b.P; ++j) {
@@ -73,7 +73,7 @@ template <class Real> struct Equation {
 /// What is solved for; held points and directors know theirs.
 template <class Real> struct Velocities {
     Vec3<Real> *u;
-    Lanes<Real> *spin; // of s, "kirchhoff" only
+    Lanes<Real> *spin; // of s; only "kirchhoff" solves for it
 };
 
 /// Mass, drag, the row of a contact on the diagonal, and the right side of point i.
@@ -129,6 +129,9 @@ template <class Real, Torsion torsion> class Solver {
         window.clear();
         for (int i = 0; i < b.P; ++i) {
             add_terms(eq, i, !again, scale, window);
+            if constexpr (torsion == Torsion::rotor)
+                if (i == 0 && b.clamped)
+                    add_root(b, eq.edges, eq.from.m[0], to.spin[0] * eq.edges.il[0], !again, scale, window);
             if (!again) {
                 const Vec3<Real> now = i + 1 < b.P ? edge_force(eq.edges, eq.from.T, i) : Vec3<Real>{};
                 eq.f[i] = b.load[i] + b.per_mass * (now - before);

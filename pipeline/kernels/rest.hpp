@@ -27,6 +27,7 @@ struct RestShape {
     std::vector<double> curvature, torsion;  // (S, P-2), (S, P-4) [1/m]
     std::vector<double> dihedral;            // (S, P-3) [rad]
     std::vector<double> ratio, weight;       // (S, P-3) [1], [N m]
+    std::vector<double> root_weight;         // (S,) [N m], see root.hpp
     std::vector<uint8_t> held;               // (S, P): 0 free, 1 by the head, 2 by the hand
     std::vector<double> offset;              // (S, P) [m]
     std::vector<double> directors, strain;   // (S, P-1, 3); (S, P-2, 3) [1, 1, rad], "kirchhoff"
@@ -72,6 +73,12 @@ inline void rotor_rest(const Vec *d, double dl, double k_tau, double kappa_0, do
     *weight = bent ? k_tau / dl * b0 * b1 / ((b0 * b0 + k0 * k0) * (b1 * b1 + k0 * k0)) : 0;
 }
 
+/// Weight of "rotor" about a segment of length l between two bends of the same sine b.
+inline double rotor_weight(double b, double l, double k_tau, double kappa_0) {
+    double fading = b * b + kappa_0 * l * kappa_0 * l;
+    return b > kNoBend ? k_tau / l * b * b / (fading * fading) : 0;
+}
+
 /// Fills what follows from one strand's points: lengths, masses, curvature, torsion.
 inline void derive_strand(RestShape &rest, int s, double mass_per_length, double kappa_0) {
     const int P = rest.P;
@@ -90,6 +97,7 @@ inline void derive_strand(RestShape &rest, int s, double mass_per_length, double
         rest.curvature[size_t(s) * (P - 2) + i - 1] = bend_curvature(d[i - 1], d[i], dl);
         if (i > 1 && i < P - 2) rest.torsion[size_t(s) * (P - 4) + i - 2] = stencil_torsion(&d[i - 2], &l[i - 2]);
     }
+    rest.root_weight[s] = rotor_weight(norm(cross(d[0], d[1])), l[0], rest.twisting[s], kappa_0);
     for (int j = 1; j < P - 2; ++j) {
         size_t k = size_t(s) * (P - 3) + j - 1;
         rotor_rest(&d[j - 1], l[j], rest.twisting[s], kappa_0, &rest.dihedral[k], &rest.ratio[k], &rest.weight[k]);

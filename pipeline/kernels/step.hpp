@@ -167,15 +167,11 @@ template <class Real> class Stepper {
         }
     }
 
-    /// Held directors go with the head or the hand; the torsion models without directors leave them as they are.
+    /// Held directors go with the head or the hand; of the others only "kirchhoff" takes care.
     void hold_directors(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
-        if (has_directors()) {
-            const Rigid<Real> ends[2] = {interval.poses.head[1], interval.poses.hand[1]};
-            directors_.hold(block, edges_, ends, Real(interval.dt), from, to);
-            return;
-        }
-        std::copy_n(from.m, block.P, to.m);
-        std::copy_n(from.twist, block.P, to.twist);
+        const Rigid<Real> ends[2] = {interval.poses.head[1], interval.poses.hand[1]};
+        directors_.hold(block, edges_, ends, Real(interval.dt), from, to);
+        if (!has_directors()) std::copy_n(from.twist, block.P, to.twist);
     }
 
     /// Banded solve; rows that would pull are dropped and the system is solved again.

@@ -9,6 +9,7 @@
 
 #include "banded.hpp"
 #include "energy.hpp"
+#include "root.hpp"
 
 namespace ringlet {
 
@@ -91,6 +92,24 @@ RINGLET_INLINE void add_rotor(const Block<Real> &b, Edges<Real> &edges, int i, b
         point_gradient<Real, 3>(turns, gradient[row]);
     }
     window.add_squares(gradient[0], gradient[1], scale * b.G[i]);
+}
+
+/// "rotor" at a clamped root: the window begins at point 0; the director m of segment 0 turns at a known
+/// rate [1/s].
+template <class Real, class Window>
+RINGLET_INLINE void add_root(const Block<Real> &b, Edges<Real> &edges, Vec3<Real> m, Lanes<Real> rate, bool force,
+                             Lanes<Real> scale, Window &window) {
+    const RootBend<Real> root(b, edges, m);
+    if (force) add_root_gradient(b, root, edges);
+    Lanes<Real> gradient[2][9];
+    for (int a = 0; a < 2; ++a) {
+        const Vec3<Real> turns[2] = {turning(root.by_d0[a], edges.d[0], edges.il[0]),
+                                     turning(root.by_d1[a], edges.d[1], edges.il[1])};
+        point_gradient<Real, 2>(turns, gradient[a]);
+        const Lanes<Real> known = scale * b.root_weight * root.by_theta[a] * rate;
+        for (int k = 0; k < 9; ++k) window.right[k] -= known * gradient[a][k];
+    }
+    window.add_squares(gradient[0], gradient[1], scale * b.root_weight);
 }
 
 /// "frenet" at point i: Gauss-Newton, one row of five points.

@@ -96,6 +96,7 @@ template <class Real> class Directors {
               const Motion<Real> &from, Motion<Real> &to) {
         for (int j = 0; j < b.P - 1; ++j) {
             spin[j] = L{};
+            to.m[j] = from.m[j];
             if (!any<Real>(b.turns[j] < 1)) continue;
             const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = inverse_root<Real>(dot(edge, edge)) * edge;
             const Vec3<Real> by_head = head_and_hand[0].turn(b.director[j]);
@@ -103,7 +104,7 @@ template <class Real> class Directors {
             const Vec3<Real> m = squared(select(b.hand[j] > 0, by_hand, by_head), t);
             const Vec3<Real> before = squared(transport(from.m[j], edges.d[j], t), t);
             const HalfAngle<Real> half(dot(before, m), dot(cross(before, m), t));
-            to.m[j] = m;
+            to.m[j] = select(b.turns[j] > 0, to.m[j], m);
             spin[j] = (1 - b.turns[j]) * half.angle / (dt * edges.il[j]);
         }
     }

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.config.schema import Hair, Simulate
+from pipeline.simulate.section import bending_stiffness, lay_sections, mass_per_length, twisting_stiffness
 
 _STRAIGHTEST_CURL = (
     20.0  # [1/m]; wavy hair bends with radii up to 5 cm, the torsion of what bends less is noise
@@ -15,21 +16,6 @@ _STRAIGHTEST_CURL = (
 _DRAG, _DRAG_SPEED, _FITTED_WIDTH, _FITTED_DENSITY = 11.0, 15.0, 80e-6, 1300.0
 
 
-def mass_per_length(hair: Hair) -> float:
-    """Mass of a round fibre per length, rho pi r^2 [kg/m]."""
-    return hair.density * np.pi * hair.radius**2
-
-
-def bending_stiffness(hair: Hair) -> float:
-    """E I = E pi r^4 / 4 [N m^2] of a round fibre."""
-    return hair.young_modulus * np.pi * hair.radius**4 / 4
-
-
-def twisting_stiffness(hair: Hair) -> float:
-    """G J = G pi r^4 / 2 [N m^2] of a round fibre."""
-    return hair.shear_modulus * np.pi * hair.radius**4 / 2
-
-
 def rest_shape(
     hair: Hair, points: NDArray[np.floating], held: NDArray[np.uint8], offset: NDArray[np.floating]
 ) -> kernels.RestShape:
@@ -38,10 +24,11 @@ def rest_shape(
     Raises ValueError when points are not finite or a segment has no length.
     """
     count = len(points)
+    soft, stiff = bending_stiffness(hair)
     rest = kernels.rest_shape(
         np.ascontiguousarray(points, np.float64),
         np.full(count, mass_per_length(hair)),
-        np.full(count, bending_stiffness(hair)),
+        np.full(count, soft),
         np.full(count, twisting_stiffness(hair)),
         np.ascontiguousarray(held, np.uint8),
         np.ascontiguousarray(offset, np.float64),
@@ -51,6 +38,9 @@ def rest_shape(
     # that a strand can show, and what would act once it bends.
     half_turn = np.pi / rest.length.mean(axis=1, keepdims=True)
     rest.torsion = np.clip(rest.torsion, -half_turn, half_turn)
+    if hair.ellipticity > 1:
+        rest.bending_2 = np.full(count, stiff)
+        lay_sections(rest, _STRAIGHTEST_CURL)
     return rest
 
 

@@ -259,7 +259,9 @@ def test_energies_are_those_of_the_formulas(curl: Points, kinked: Points) -> Non
     state.velocity[...] = 0.5
     bending, torsion, kinetic, gravity = kernels.energies(state, rest, settings())[0]
     assert bending == pytest.approx(kernels.bending(kinked[None], rest)[0][0], rel=1e-12)
-    assert torsion == pytest.approx(kernels.torsion_rotor(kinked[None], rest)[0][0], rel=1e-12)
+    assert torsion == pytest.approx(
+        kernels.torsion_rotor(kinked[None], rest, state.directors)[0][0], rel=1e-12
+    )
     assert kinetic == pytest.approx(0.5 * rest.mass.sum() * 0.75, rel=1e-12)
     assert gravity == pytest.approx(9.81 * (rest.mass[0] * kinked[:, 1]).sum(), rel=1e-12)
     bending, twisting, _, _ = kernels.energies(state, rest, settings(torsion="kirchhoff"))[0]

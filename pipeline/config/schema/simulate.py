@@ -12,7 +12,9 @@ from pipeline.config.units import Acceleration, Angle, Density, Duration, Length
 
 class Hair(Section):
     radius: Annotated[Length, Field(gt=0)] = 40e-6
-    """Radius of a fibre."""
+    """Radius of a fibre; of the circle of the same area where the section is an ellipse."""
+    ellipticity: Annotated[float, Field(ge=1, le=10)] = 1.0
+    """Largest over smallest diameter of the section (Asian 1.29, Caucasian 1.41, African 1.66); for torsion "kirchhoff"."""
     young_modulus: Annotated[Pressure, Field(ge=0)] = 4e9
     """Young's modulus: resistance to bending and stretching."""
     shear_modulus: Annotated[Pressure, Field(ge=0)] = 0.9e9
@@ -154,6 +156,15 @@ class Simulate(Section):
     def _one_motion_of_tips(self) -> "Simulate":
         if self.tips and self.tips_file is not None:
             raise ValueError("the motion of tips comes from tips or from tips_file; remove one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _sections_are_seen(self) -> "Simulate":
+        if self.hair.ellipticity > 1 and self.torsion != "kirchhoff":
+            raise ValueError(
+                f'only simulate.torsion = "kirchhoff" knows elliptic sections, not "{self.torsion}"; '
+                "set it, or hair.ellipticity = 1"
+            )
         return self
 
     @field_validator("rest")
