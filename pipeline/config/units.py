@@ -20,6 +20,7 @@ _DENSITIES = {"kg/m^3": 1.0, "g/cm^3": 1e3}
 _PER_SECOND = {"1/s": 1.0, "Hz": 1.0, "fps": 1.0}
 _SPEEDS = {"m/s": 1.0, "cm/s": 1e-2}
 _ACCELERATIONS = {"m/s^2": 1.0}
+_FORCES = {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "µN": 1e-6}
 _CURVATURES = {"1/m": 1.0, "1/cm": 100.0}
 
 
@@ -67,4 +68,5 @@ Density = Annotated[float, _unit_validator(_DENSITIES), _unit_schema(_DENSITIES)
 Rate = Annotated[float, _unit_validator(_PER_SECOND), _unit_schema(_PER_SECOND)]
 Speed = Annotated[float, _unit_validator(_SPEEDS), _unit_schema(_SPEEDS)]
 Acceleration = Annotated[float, _unit_validator(_ACCELERATIONS), _unit_schema(_ACCELERATIONS)]
+Force = Annotated[float, _unit_validator(_FORCES), _unit_schema(_FORCES)]
 Curvature = Annotated[float, _unit_validator(_CURVATURES), _unit_schema(_CURVATURES)]

@@ -3,10 +3,14 @@
 // Source: contact.md section 1 (the recommended scheme), steps a to d2. Notation: phi signed distance at the head's new
 // pose, h contact offset of the point, n world normal, g = phi - h gap, N contact force over the mean mass [m/s^2],
 // s displacement that the contact force is worth [m], a 1 where the contact holds.
+// The distance tells how deep a point is and which way is out, but not on which side of a thin part it was. A point that
+// moves far relative to the head in a step is followed along its way (path.hpp); where that leads through the head, phi
+// is the distance to the plane on which it went in.
 #pragma once
 
 #include "block.hpp"
 #include "distance_field.hpp"
+#include "path.hpp"
 #include "pose.hpp"
 
 namespace ringlet {
@@ -16,27 +20,43 @@ inline constexpr double kKeepGap = 0.2e-3;  // [m] a contact that pushed keeps i
 inline constexpr double kKeepWeight = 0.2;  // and closes this part of the gap
 inline constexpr double kPull = 0.01;       // [m/s^2] a row that pulls more than this is dropped
 inline constexpr double kDepth = 0.05e-3;   // [m] depth below the offset that is let pass
+inline constexpr double kWay = 0.7;         // [cells] a shorter way in a step cannot lead through what cells resolve
 
 /// The head during one step.
 template <class Real> struct HeadStep {
     const DistanceField *field; // null for no head
-    Rigid<Real> local, turn;    // world -> rest frame at the new pose; rest frame -> world
+    Rigid<Real> was, local;     // world -> rest frame, at the old pose and at the new one
+    Rigid<Real> turn;           // rest frame -> world at the new pose
     Rigid<Real> carry;          // world -> world: what moves with the head from the old pose to the new one
+    Pose before, after;
 
     HeadStep(const DistanceField *field, const Pose &before, const Pose &after)
-        : field(field), local(after.inverse()), turn(after), carry(after * before.inverse()) {}
+        : field(field), was(before.inverse()), local(after.inverse()), turn(after), carry(after * before.inverse()),
+          before(before), after(after) {}
+
+    /// Where a point that moves straight through the world is at half time, seen from the head: from its places in the
+    /// rest frame at the beginning and at the end.
+    Vec3<Real> between(Vec3<Real> begin, Vec3<Real> end) const {
+        const L half = splat(Real(0.5));
+        return Rigid<Real>(halfway(before, after).inverse())(half * (Rigid<Real>(before)(begin) + turn(end)));
+    }
+
+  private:
+    using L = Lanes<Real>;
 };
 
 template <class Real> struct Contacts {
     using L = Lanes<Real>;
     const L none = splat(Real(0)), one = splat(Real(1));
     Vec3<Real> *n, *nearby;    // normal of the contact; place of the last sample in the head's frame
+    Vec3<Real> *start;         // where the step begins, in the head's frame
     L *phi;                    // distance there
     L *row, *gap, *N;          // rows: 1 where one acts, g', contact force of the solve
     L *a, *s, *fresh, *stuck;  // rounds: contact holds, worth, new part of s, held by friction
     bool any_row = false;
 
-    Contacts(Arena &arena, int P) : n(arena.take<Vec3<Real>>(P)), nearby(arena.take<Vec3<Real>>(P)) {
+    Contacts(Arena &arena, int P)
+        : n(arena.take<Vec3<Real>>(P)), nearby(arena.take<Vec3<Real>>(P)), start(arena.take<Vec3<Real>>(P)) {
         for (auto **array : {&phi, &row, &gap, &N, &a, &s, &fresh, &stuck}) *array = arena.take<L>(P);
     }
 
@@ -45,15 +65,22 @@ template <class Real> struct Contacts {
         for (int i = 0; i < P; ++i) phi[i] = splat(Real(-1e3)), nearby[i] = Vec3<Real>{};
     }
 
-    /// Samples the field at point i; false when no lane can be within `reach` of the surface. A sample is spared when
-    /// the last one and the steepest slope of the field prove as much.
+    /// Samples the field at point i; false when no lane can be within `reach` of the surface, or has passed it in this
+    /// step. A sample is spared when the last one and the steepest slope of the field prove as much.
     RINGLET_INLINE bool near(const HeadStep<Real> &head, int i, Vec3<Real> x, L reach, L &distance,
                              Vec3<Real> &normal) {
-        const Vec3<Real> at = head.local(x), moved = at - nearby[i];
-        L bound = phi[i] - Real(head.field->steepest) * square_root<Real>(dot(moved, moved));
+        const Vec3<Real> at = head.local(x), moved = at - nearby[i], begun = start[i] - nearby[i];
+        L square = maximum<Real>(dot(moved, moved), dot(begun, begun)); // a ball that holds both ends holds the way
+        L bound = phi[i] - Real(head.field->steepest) * square_root<Real>(square);
         if (!any<Real>(~(bound > reach))) return false;
         sample<Real>(*head.field, at, distance, normal);
         nearby[i] = at, phi[i] = distance;
+        const Vec3<Real> way = at - start[i];
+        const Real far = Real(kWay * head.field->spacing);
+        if (any<Real>(dot(way, way) > far * far)) {
+            const Vec3<Real> between = head.between(start[i], at);
+            follow<Real>(*head.field, Way<Real>(start[i], between, at), dot(way, way) > far * far, distance, normal);
+        }
         if (!any<Real>(distance < reach)) return false;
         L steepness = square_root<Real>(dot(normal, normal) + Real(1e-20));
         normal = head.turn.turn((1 / steepness) * normal);
@@ -66,6 +93,7 @@ template <class Real> struct Contacts {
         for (int i = 0; i < b.P; ++i) {
             row[i] = none, a[i] = none, s[i] = none, fresh[i] = none, stuck[i] = none, N[i] = none;
             if (!head.field || i < b.first) continue;
+            start[i] = head.was(from.x[i]);
             L distance;
             Vec3<Real> normal;
             const L reach = b.offset[i] + Real(kKeepGap);

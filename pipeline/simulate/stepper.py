@@ -67,6 +67,9 @@ class Simulation:
             )
         self.simulate = simulate
         self.rest = rest_shape(simulate.hair, guides.points, guides.held, guides.offset)
+        load = self.rest.load
+        load[:, -1] = simulate.tip_load
+        self.rest.load = load
         self.field = guides.field
         self.settings = step_settings(simulate)
         self.head = head_motion(simulate.motion, simulate.fps)

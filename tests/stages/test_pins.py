@@ -142,3 +142,17 @@ def test_tips_are_brought_to_the_first_pose_of_their_file_before_the_first_frame
     assert np.abs(simulation.state.points[:, -2:] - expected).max() < 1e-8
     with pytest.raises(ValueError, match="remove one of them"):
         Simulate(tips_file="x", tips=(Keyframe(time=0.0),))
+
+
+def test_a_load_on_the_tips_pulls_the_strands_its_way() -> None:
+    """100 times the weight, sideways: but for the clamp the strand lies along load and weight."""
+    guides = hanging(held_ends(np.array([[1, 0], [2, 0]]), POINTS))
+    points = settled(guides, tip_load=(1e-3, 0.0, 0.0)).state.points
+    last = points[:, -1] - points[:, -2]
+    weight = 1300 * np.pi * 40e-6**2 * 0.01 / 2 * 9.81  # of the tip: half a segment
+    angle = np.degrees(np.arctan2(-last[:, 1], last[:, 0]))
+    print(
+        f"last segments {angle.round(4).tolist()} degrees below the load, expected {np.degrees(weight / 1e-3):.4f}"
+    )
+    assert angle[0] == pytest.approx(np.degrees(weight / 1e-3), abs=0.01)
+    assert angle[1] == pytest.approx(0.0, abs=5.0)

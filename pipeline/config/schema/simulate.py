@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 
 from pipeline.config.schema.base import Position, Section, Velocity
 from pipeline.config.schema.hair_contact import HairContact
-from pipeline.config.units import Acceleration, Angle, Density, Duration, Length, Pressure, Rate, Speed
+from pipeline.config.units import Acceleration, Angle, Density, Duration, Force, Length, Pressure, Rate, Speed
 
 
 class Hair(Section):
@@ -151,6 +151,8 @@ class Simulate(Section):
     """Motion of pinned tips relative to the head, as keyframes."""
     tips_file: str | None = None
     """Motion of pinned tips relative to the head, as a file of transforms [m] (see motion.file)."""
+    tip_load: tuple[Force, Force, Force] = (0.0, 0.0, 0.0)
+    """Constant force on the tip of every guide [N], in the world: a bead, a pull; a hair of 25 cm weighs 16 uN."""
 
     @model_validator(mode="after")
     def _one_motion_of_tips(self) -> "Simulate":

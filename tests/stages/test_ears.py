@@ -1,0 +1,44 @@
+"""Hair and the ears of the built-in head: they are thin, and no strand goes through them however fast it comes."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipeline import kernels
+from pipeline.config.schema import Hair, Simulate
+from pipeline.groom.heads import Head
+from pipeline.simulate.rest import rest_shape, step_settings
+
+POINTS = 12
+
+
+def thrown_at_the_ear(head: Head, dt: float, speed: float) -> tuple[float, NDArray[np.float64]]:
+    """Short strands that fly forwards at the left ear; the least distance [m] of their ways, and where they end."""
+    points = np.zeros((4, POINTS, 3))
+    points[..., 0] = np.array([0.080, 0.083, 0.086, 0.089])[:, None]
+    points[..., 1], points[..., 2] = np.linspace(-0.01, 0.02, POINTS), -0.062
+    rest = rest_shape(Hair(), points, np.zeros((4, POINTS), np.uint8), np.full((4, POINTS), 1e-3))
+    state = kernels.at_rest(points)
+    state.velocity[..., 2] = speed
+    settings = step_settings(Simulate(fps=1 / dt, substeps=1, gravity=(0, 0, 0), air={"shielding": 0.0}))
+    field = kernels.DistanceField(head.field.values, head.field.origin, head.field.spacing)
+    drive = kernels.Drive(np.tile(np.eye(4), (2, 1, 1)), np.zeros((1, 3)))
+    u, lowest = np.linspace(0, 1, 201)[:, None, None, None], np.inf
+    for _ in range(max(1, round(0.12 / speed / dt))):
+        before = state.points.copy()
+        kernels.advance(state, rest, field, drive, settings)
+        way = before + u * (state.points - before)
+        lowest = min(lowest, float(head.field.distance(way.reshape(-1, 3)).min()))
+    return lowest, state.points.copy()
+
+
+@pytest.mark.parametrize("dt", [1 / 24, 1 / 60, 1 / 240])
+def test_no_strand_flies_through_an_ear(mannequin: Head, dt: float) -> None:
+    for speed in (1.0, 3.0, 8.0):
+        lowest, points = thrown_at_the_ear(mannequin, dt, speed)
+        print(
+            f"dt 1/{1 / dt:.0f}, {speed * dt * 1e3:.0f} mm a step: ways come as near as {lowest * 1e3:.2f} mm, "
+            f"strands end at z {points[..., 2].mean(axis=1).round(3).tolist()}"
+        )
+        assert lowest > -0.2e-3  # the ear is up to 9 mm thick there: what goes through comes 4.4 mm deep
+        assert points[..., 2].mean(axis=1).min() < -0.02  # at least the innermost is stopped behind it
