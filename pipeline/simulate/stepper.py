@@ -158,7 +158,7 @@ class Simulation:
         state = kernels.at_rest(
             np.ascontiguousarray(moved, precision), np.ascontiguousarray(directors, precision)
         )
-        if self.simulate.rest == "sag_free":
+        if self.simulate.sag_free_start:
             start = hold_groom(self.rest, self.field, self.simulate.gravity, pose, self.simulate.sag_free)
             state.tension[:], state.contact[:] = start.tension, start.contact
             self.sag_free = start.report

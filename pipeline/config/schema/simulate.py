@@ -125,10 +125,10 @@ class Simulate(Section):
     """Precision of the guides: "float32" is twice as fast, but fails on short strands of many points (spacing below 1 mm)."""
     theta: Annotated[float, Field(ge=0.5, le=1)] = 0.6
     """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond."""
-    torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "rotor"
+    torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "kirchhoff"
     """Torsion model: "kirchhoff" (material frames), "rotor" (4-point), "frenet" (the lecture's, regularised) or "none"."""
-    rest: Literal["groom", "sag_free"] = "groom"
-    """Rest shape: the "groom" itself, which then sags under gravity, or "sag_free", one that holds the groom (torsion "kirchhoff")."""
+    rest: Literal["groom", "sag_free"] | None = None
+    """Rest shape: the "groom" itself, which then sags under gravity, or "sag_free", one that holds the groom; unset, "sag_free" where the torsion model can ("kirchhoff")."""
     sag_free: SagFree = SagFree()
     """How stable a sag-free groom is made."""
     relaxation: Literal["newton", "sweep"] = "newton"
@@ -169,9 +169,14 @@ class Simulate(Section):
             )
         return self
 
+    @property
+    def sag_free_start(self) -> bool:
+        """Whether the rest shape is one that holds the groom."""
+        return self.torsion == "kirchhoff" and self.rest != "groom"
+
     @field_validator("rest")
     @classmethod
-    def _torsion_holds_it(cls, rest: str, info: ValidationInfo) -> str:
+    def _torsion_holds_it(cls, rest: str | None, info: ValidationInfo) -> str | None:
         torsion = info.data.get("torsion", "kirchhoff")
         if rest == "sag_free" and torsion != "kirchhoff":
             raise ValueError(f'"sag_free" needs simulate.torsion = "kirchhoff": {_CANNOT_HOLD[torsion]}')
