@@ -55,9 +55,11 @@ template <class Real> void add_edge_forces(const Edges<Real> &edges, int P, Vec3
 }
 
 /// What residuals and their derivatives are multiplied by, so that the squares of these are the stiffness in the units
-/// of a system of equations; `inverse` = 1 / root^2 takes the gradient back to newtons.
+/// of a system of equations; `inverse` = 1 / root^2 takes the gradient back to newtons. Root^2 holds the damping too:
+/// `undamped` is the part of it without, for stiffness that has no damping.
 template <class Real> struct Scale {
     Lanes<Real> root = splat(Real(1)), inverse = splat(Real(1));
+    Real undamped = 1;
 };
 
 /// An energy of squares: residuals and their derivatives by `Reach` consecutive edges, both times scale.root.
@@ -107,7 +109,7 @@ template <class Real> struct Bend : Squares<Real, 1, 2> {
         this->g[0][0] = il0 * (turn_e - turn_c - along * edges.d[i - 1]);
         this->g[0][1] = il1 * (turn_e + turn_c - along * edges.d[i]);
         open = maximum<Real>(1 - Real(0.5) * kappa_r * b.dl[i] * inverse_ratio, zero) * (twice * twice) * inverse_ee *
-               (il0 * il1);
+               (il0 * il1) * scale.undamped;
     }
 };
 

@@ -164,11 +164,11 @@ template <class Real, Torsion torsion> class Solver {
         else return {{held, held, held}};
     }
 
-    /// theta dt (theta dt + beta) over m0.
+    /// theta dt (theta dt + beta) over m0, and its part without beta.
     static Scale<Real> stiffness_scale(const Equation<Real> &eq) {
         const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
         const L square = splat(theta_dt * (theta_dt + Real(eq.settings.damping))) * eq.b.per_mass;
-        return {square_root<Real>(square), 1 / square};
+        return {square_root<Real>(square), 1 / square, theta_dt / (theta_dt + Real(eq.settings.damping))};
     }
 
     /// The rows of point i without contacts.
@@ -178,7 +178,7 @@ template <class Real, Torsion torsion> class Solver {
         assembly.open();
         Outer<Real> stretching;
         if (i + 1 < b.P) {
-            stretching = stretch(b, eq.edges, i, eq.from.T[i], scale.root * scale.root, Real(eq.step.dt));
+            stretching = stretch(b, eq.edges, i, eq.from.T[i], eq.step.dt, eq.settings.theta);
             assembly.edge(0) = assembly.edge(0) + eq.from.T[i] * eq.edges.d[i];
         }
         if constexpr (turns) add_joint(eq, i, scale, stretching, assembly);
@@ -195,7 +195,7 @@ template <class Real, Torsion torsion> class Solver {
     RINGLET_INLINE static void add_turn(const Equation<Real> &eq, int i, L F_theta, PointRows &rows) {
         const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
         const bool is_last = i + 1 == eq.b.P;
-        rows.entries[3][3] += splat(is_last ? Real(1) : Real(kSpin));
+        rows.entries[3][3] += splat(is_last ? Real(1) : Real(kLeastSpin));
         rows.right[3] = is_last ? L{} : -theta_dt * eq.b.per_mass * eq.edges.il[i] * F_theta;
     }
 
@@ -252,6 +252,7 @@ template <class Real, Torsion torsion> class Solver {
         }
         assembly.fill(rows.row, [&](int row, int column, L &sum) RINGLET_ALWAYS {
             if (row % 4 == 3 && column % 4 == 3) sum += rows.turning[row / 4] * rows.turning[column / 4];
+            if (row % 4 == 3 && column == row) sum += rows.least[row / 4];
             if (column < 3) sum += stretching.at(row, column);
         });
     }

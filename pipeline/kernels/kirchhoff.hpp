@@ -24,9 +24,11 @@ namespace ringlet {
 
 /// 1 + p counts at least this much: a fold sharper than 180 - 0.1 degrees (168 in float32).
 template <class Real> inline constexpr Real kFold = sizeof(Real) == 4 ? Real(1e-2) : Real(1e-6);
-/// The matrix takes this part of a segment's mass as inertia of its spin: a free rod may turn about itself. (That of a
-/// fibre, m r^2 / (2 l^2), is about 1e-5.)
-inline constexpr double kSpin = 1e-4;
+/// Nothing may hold the directors of a free rod: this part of their stiffness does, in every matrix, and where there is
+/// none either this part of a point's mass. (As inertia it would brake a strand that turns, the more the shorter the
+/// step: test_a_free_curl_keeps_its_angular_momentum.)
+template <class Real> inline constexpr Real kLeastTwisting = sizeof(Real) == 4 ? Real(1e-5) : Real(1e-9);
+inline constexpr double kLeastSpin = 1e-9;
 
 /// x rounded to the nearest integer: adding 1.5 2^52 (2^23) leaves no digits after the point.
 template <class Real> RINGLET_INLINE Lanes<Real> nearest(Lanes<Real> x) {
@@ -151,6 +153,7 @@ template <class Real> struct RodRows {
     using L = Lanes<Real>;
     L row[3][8];
     L turning[2]; // a fourth row that has s only: what the exact stiffness of a common turn has on top
+    L least[2];   // on the diagonal of s
 
     RodRows() = default;
 
@@ -173,8 +176,10 @@ template <class Real> struct RodRows {
             after[1] * (q.a2 - (Real(0.5) * q.k2) * tt + (Real(0.25) * q.k2) * qb), c2 * before[1], c2 * after[1]);
         set(2, before[2] * kb, after[2] * kb, -before[2], after[2]);
         const L more = turning_stiffness(b, i, q) - 4 * (B1 * c1 * c1 + B2 * c2 * c2);
-        const L common = Real(0.5) * root * square_root<Real>(maximum<Real>(more, splat(Real(0))));
+        const L common = Real(0.5) * root * square_root<Real>(scale.undamped * maximum<Real>(more, splat(Real(0))));
         turning[0] = common * il0, turning[1] = common * il1;
+        const L held = kLeastTwisting<Real> * (weight[0] * weight[0] + weight[2] * weight[2]);
+        least[0] = held * il0 * il0, least[1] = held * il1 * il1;
     }
 
   private:

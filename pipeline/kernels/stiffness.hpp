@@ -3,6 +3,10 @@
 //     K = sum g g^T (Gauss-Newton, for bending and torsion) + max(0, 1 - kappa_r/kappa) transverse bending
 //         + k_s d d^T + (T/l)^+ (I - d d^T),      k_s = max(1e3 m0/dt^2, 10 T/l)      (physics.md section 3)
 // The exact g g^T of bending is needed: without it tight curls blow up at 2 ms. All is by edges: see banded.hpp.
+// Internal damping is beta times the g g^T only, which a rigid turn leaves alone. The other stiffness would brake it: k_s
+// the more, the shorter the step (test_the_motion_converges_with_damping). The tension is that of the step's end,
+// whatever theta is: with theta's mean it rings, and tight curls never rest at 1/60 s
+// (test_tight_curls_come_to_rest_in_long_steps).
 #pragma once
 
 #include "banded.hpp"
@@ -65,12 +69,13 @@ template <class Real> struct BendStiffness {
     }
 };
 
-/// Stretch of segment j and the stiffness of its tension T, times scale.
+/// Stretch of segment j, and the stiffness of its tension T, in the units of the system.
 template <class Real>
-RINGLET_INLINE Outer<Real> stretch(const Block<Real> &b, const Edges<Real> &edges, int j, Lanes<Real> T,
-                                   Lanes<Real> scale, Real dt) {
-    const Lanes<Real> tight = scale * maximum<Real>(T, splat(Real(0))) * edges.il[j];
-    return {edges.d[j], scale * b.m0 * stretch_stiffness(b, T, j, dt) - tight, tight};
+RINGLET_INLINE Outer<Real> stretch(const Block<Real> &b, const Edges<Real> &edges, int j, Lanes<Real> T, double dt,
+                                   double theta) {
+    const Real theta_dt = Real(theta * dt);
+    const Lanes<Real> tight = (theta_dt * theta_dt) * b.per_mass * maximum<Real>(T, splat(Real(0))) * edges.il[j];
+    return {edges.d[j], theta_dt * Real(dt) * stretch_stiffness(b, T, j, Real(dt)) - tight, tight};
 }
 
 } // namespace ringlet
