@@ -59,23 +59,24 @@ template <class Real> struct Block {
     bool clamped = false;     // some lane has a root_weight
     Lanes<Real> k_kappa, k_tau, m0, per_mass; // per_mass = 1 / m0
     Lanes<Real> k_kappa_2, k_ratio, inverse_ratio; // "kirchhoff": B2, B2 / B1, B1 / B2
+    Lanes<Real> root_kappa, root_kappa_2, root_tau; // square roots of k_kappa, k_kappa_2, k_tau
     Vec3<Real> *anchor;                 // rest position of a point
     Lanes<Real> root_bend[2], root_weight;    // root.hpp; weight 0 unless the head holds points 0 and 1
     Vec3<Real> *load;                   // constant force on a point over m0
     Vec3<Real> *director, *strain;      // "kirchhoff": of segment j; (r1, r2, r3) at point i
     Lanes<Real> *turns;                 // 1 where the director of segment j is free: not both its ends are held
     Lanes<Real> *l, *dl;                // length of segment j; mean length of the segments beside point i
-    Lanes<Real> *inverse_l, *inverse_dl;
+    Lanes<Real> *inverse_l, *inverse_dl, *root_dl; // 1 / l, 1 / dl, sqrt(dl)
     Lanes<Real> *mu, *w;                // mass and mobility of a point, see above
     Lanes<Real> *free, *hand, *offset;  // 1 where free; 1 where the hand holds; contact offset
     Lanes<Real> *kappa_r, *tau_r;       // at point i
-    Lanes<Real> *C, *S, *G;             // "rotor" about segment i
-    Lanes<Real> *root, *inverse_root;   // its sqrt(rho), 1 / sqrt(rho)
+    Lanes<Real> *C, *S;                 // "rotor" about segment i: cos(phi_r), sin(phi_r)
+    Lanes<Real> *G_before, *G_after;    // its sqrt(G rho), sqrt(G / rho)
 
     Block(Arena &arena, int points) : P(points) {
         for (auto **array : {&anchor, &load, &director, &strain}) *array = arena.take<Vec3<Real>>(P);
-        for (auto **array : {&turns, &l, &dl, &inverse_l, &inverse_dl, &mu, &w, &free, &hand, &offset, &kappa_r,
-                             &tau_r, &C, &S, &G, &root, &inverse_root})
+        for (auto **array : {&turns, &l, &dl, &inverse_l, &inverse_dl, &root_dl, &mu, &w, &free, &hand, &offset,
+                             &kappa_r, &tau_r, &C, &S, &G_before, &G_after})
             *array = arena.take<Lanes<Real>>(P);
     }
 };
@@ -170,7 +171,10 @@ template <class Real> void derive(Block<Real> &b, const RestShape &rest, const i
         b.load[i] = b.per_mass * b.load[i];
         if (i > 0) b.turns[i - 1] = maximum<Real>(b.free[i - 1], b.free[i]);
         if (i < b.P - 1) b.inverse_l[i] = 1 / b.l[i];
-        if (i > 0 && i < b.P - 1) b.dl[i] = Real(0.5) * (b.l[i - 1] + b.l[i]), b.inverse_dl[i] = 1 / b.dl[i];
+        if (i > 0 && i < b.P - 1) {
+            b.dl[i] = Real(0.5) * (b.l[i - 1] + b.l[i]);
+            b.inverse_dl[i] = 1 / b.dl[i], b.root_dl[i] = square_root<Real>(b.dl[i]);
+        }
     }
 }
 
@@ -184,8 +188,8 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
     gather<Real>(b.offset, rest.offset.data(), P, P, strand);
     gather<Real>(b.kappa_r + 1, rest.curvature.data(), P - 2, P - 2, strand);
     gather<Real>(b.tau_r + 2, rest.torsion.data(), P - 4, P - 4, strand);
-    gather<Real>(b.root + 1, rest.ratio.data(), P - 3, P - 3, strand);
-    gather<Real>(b.G + 1, rest.weight.data(), P - 3, P - 3, strand);
+    gather<Real>(b.G_after + 1, rest.ratio.data(), P - 3, P - 3, strand);
+    gather<Real>(b.G_before + 1, rest.weight.data(), P - 3, P - 3, strand);
     gather<Real>(b.C + 1, rest.dihedral.data(), P - 3, P - 3, strand);
     gather<Real>(&b.k_kappa, rest.bending.data(), 1, 1, strand);
     gather<Real>(&b.k_tau, rest.twisting.data(), 1, 1, strand);
@@ -194,14 +198,16 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
     b.k_ratio = select<Real>(b.k_kappa > 0, b.k_kappa_2 / b.k_kappa, one);
     b.inverse_ratio = select<Real>(b.k_kappa_2 > 0, b.k_kappa / b.k_kappa_2, one);
     gather<Real>(&b.root_weight, rest.root_weight.data(), 1, 1, strand);
+    b.root_kappa = square_root<Real>(b.k_kappa), b.root_kappa_2 = square_root<Real>(b.k_kappa_2);
+    b.root_tau = square_root<Real>(b.k_tau);
     gather(b.load, rest.load.data(), P, strand);
     gather(b.director, rest.directors.data(), P - 1, strand);
     gather(b.strain + 1, rest.strain.data(), P - 2, strand);
     for (int i = 1; i < P - 2; ++i)
         for (int lane = 0; lane < kLanes<Real>; ++lane) {
-            Real phi = b.C[i][lane];
+            const Real phi = b.C[i][lane], G = b.G_before[i][lane], rho = b.G_after[i][lane];
             b.C[i][lane] = std::cos(phi), b.S[i][lane] = std::sin(phi);
-            b.root[i][lane] = std::sqrt(b.root[i][lane]), b.inverse_root[i][lane] = 1 / b.root[i][lane];
+            b.G_before[i][lane] = std::sqrt(G * rho), b.G_after[i][lane] = std::sqrt(G / rho);
         }
     derive(b, rest, strand);
     derive_root(b);

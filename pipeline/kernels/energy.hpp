@@ -4,8 +4,9 @@
 // Notation: d_j unit edge of segment j, il its inverse length now, l and dl rest lengths; at point i
 //     c = d_i - d_{i-1},  e = d_i + d_{i-1},  kappa = 2 |c| / (dl |e|)
 // All energies are functions of unit edges only, so that they do not see stretch (with "dl fixed" in the lecture's
-// point form a stretched strand gets a spurious tension of 30 strand weights). D_j is the gradient by d_j; the force of
-// an edge on its end points is -+ (I - d d^T) D / length.
+// point form a stretched strand gets a spurious tension of 30 strand weights). Each is a sum of squares, r^2 / 2, whose
+// residuals r have derivatives g by a few consecutive edges, g = (I - d d^T) (dr/dd) / length. F_j is the gradient of
+// the energy by edge j, sum r g: what pulls its end points together. The same g make the stiffness (stiffness.hpp).
 // The lecture's slides have four errors in the gradients: test_gradients_agree_with_complex_step proves these forms.
 #pragma once
 
@@ -14,28 +15,33 @@
 
 namespace ringlet {
 
-/// Unit edges of a block of strands and the gradient of the energy by them; P - 1 entries each.
+/// Unit edges of a block of strands and the gradient of the energy by the edges; P - 1 entries each.
 template <class Real> struct Edges {
-    Vec3<Real> *d, *D;
+    Vec3<Real> *d, *F;
     Lanes<Real> *il;
     Lanes<Real> *D_theta; // gradient by a turn of the director
 
     Edges(Arena &arena, int P)
-        : d(arena.take<Vec3<Real>>(P)), D(arena.take<Vec3<Real>>(P)), il(arena.take<Lanes<Real>>(P)),
+        : d(arena.take<Vec3<Real>>(P)), F(arena.take<Vec3<Real>>(P)), il(arena.take<Lanes<Real>>(P)),
           D_theta(arena.take<Lanes<Real>>(P)) {}
 
-    /// Unit edges of the points; gradients start from zero.
-    void set(const Vec3<Real> *x, int P) {
+    /// Unit edges of the points.
+    void follow(const Vec3<Real> *x, int P) {
         for (int j = 0; j < P - 1; ++j) {
             Vec3<Real> edge = x[j + 1] - x[j];
             il[j] = inverse_root<Real>(dot(edge, edge));
             d[j] = il[j] * edge;
-            D[j] = Vec3<Real>{}, D_theta[j] = Lanes<Real>{};
         }
+    }
+
+    /// The same; gradients start from zero.
+    void set(const Vec3<Real> *x, int P) {
+        follow(x, P);
+        for (int j = 0; j < P - 1; ++j) F[j] = Vec3<Real>{}, D_theta[j] = Lanes<Real>{};
     }
 };
 
-/// The part of a gradient by a unit edge that turns the edge, per length: what its end points feel.
+/// The part of a derivative by a unit edge that turns the edge, per length: the derivative by the edge.
 template <class Real> RINGLET_INLINE Vec3<Real> turning(Vec3<Real> D, Vec3<Real> d, Lanes<Real> il) {
     return il * (D - dot(D, d) * d);
 }
@@ -43,87 +49,127 @@ template <class Real> RINGLET_INLINE Vec3<Real> turning(Vec3<Real> D, Vec3<Real>
 /// Adds the forces -dE/dx to f, P entries.
 template <class Real> void add_edge_forces(const Edges<Real> &edges, int P, Vec3<Real> *f) {
     for (int j = 0; j < P - 1; ++j) {
-        Vec3<Real> F = turning<Real>(edges.D[j], edges.d[j], edges.il[j]);
-        f[j] = f[j] + F;
-        f[j + 1] = f[j + 1] - F;
+        f[j] = f[j] + edges.F[j];
+        f[j + 1] = f[j + 1] - edges.F[j];
     }
 }
 
-/// Curvature at a bend and its derivatives by c and e, which are multiples of c and e.
-template <class Real> struct Bend {
-    using L = Lanes<Real>;
-    Vec3<Real> c, e;
-    L kappa, by_c, by_e; // dkappa/dc = by_c c, dkappa/de = by_e e
-    L ratio;             // kappa_r / kappa, 0 for naturally straight
-    L inverse_ee;
+/// What residuals and their derivatives are multiplied by, so that the squares of these are the stiffness in the units
+/// of a system of equations; `inverse` = 1 / root^2 takes the gradient back to newtons. Root^2 holds the damping too:
+/// `undamped` is the part of it without, for stiffness that has no damping.
+template <class Real> struct Scale {
+    Lanes<Real> root = splat(Real(1)), inverse = splat(Real(1));
+    Real undamped = 1;
+};
 
-    /// Two guards that keep the gradient exact: |e| counts at least 0.1 (a fold sharper than 168 degrees), and
-    /// |c| is rounded by 1e-4 of its rest value, where kappa of curly hair has a cusp.
-    RINGLET_INLINE Bend(const Block<Real> &b, const Edges<Real> &edges, int i)
-        : c(edges.d[i] - edges.d[i - 1]), e(edges.d[i] + edges.d[i - 1]) {
-        const L least = splat(Real(1e-2)), zero = splat(Real(0)), kappa_r = b.kappa_r[i];
-        L ee = dot(e, e), rounding = Real(1e-4) * kappa_r * b.dl[i];
-        L cc = dot(c, c) + rounding * rounding;
-        inverse_ee = reciprocal<Real>(maximum<Real>(ee, least));
-        // r = |c| / |e|, and its inverse where there is a bend
-        L square = cc * inverse_ee, inverse_r = select<Real>(cc > zero, inverse_root<Real>(square), zero);
-        kappa = 2 * b.inverse_dl[i] * square * inverse_r;
-        by_c = 2 * b.inverse_dl[i] * inverse_ee * inverse_r;
-        by_e = select<Real>(ee > least, -kappa * inverse_ee, zero);
-        ratio = Real(0.5) * kappa_r * b.dl[i] * inverse_r;
+/// An energy of squares: residuals and their derivatives by `Reach` consecutive edges, both times scale.root.
+template <class Real, int Count, int Reach> struct Squares {
+    Lanes<Real> r[Count];
+    Vec3<Real> g[Count][Reach];
+
+    /// Adds the gradient to the edges F[0 .. Reach-1]; returns the energy.
+    RINGLET_INLINE Lanes<Real> add_gradient(const Scale<Real> &scale, Vec3<Real> *F) const {
+        Lanes<Real> energy{};
+        for (int k = 0; k < Count; ++k) {
+            const Lanes<Real> moment = scale.inverse * r[k];
+            for (int j = 0; j < Reach; ++j) F[j] = F[j] + moment * g[k][j];
+            energy += Real(0.5) * moment * r[k];
+        }
+        return energy;
     }
 };
 
-/// Adds the gradient of k_kappa (kappa - kappa_r)^2 dl / 2 at point i; returns the energy.
-template <class Real>
-RINGLET_INLINE Lanes<Real> add_bend_gradient(const Block<Real> &b, const Bend<Real> &bend, Edges<Real> &edges, int i) {
-    Lanes<Real> stiffness = b.k_kappa * b.dl[i], excess = bend.kappa - b.kappa_r[i];
-    // kappa by_c = 4 / (dl^2 |e|^2) has no cusp; the excess enters as 1 - ratio
-    Lanes<Real> along_c = 4 * b.k_kappa * b.inverse_dl[i] * (1 - bend.ratio) * bend.inverse_ee;
-    Lanes<Real> along_e = stiffness * excess * bend.by_e;
-    edges.D[i - 1] = edges.D[i - 1] - along_c * bend.c + along_e * bend.e;
-    edges.D[i] = edges.D[i] + along_c * bend.c + along_e * bend.e;
-    return Real(0.5) * stiffness * excess * excess;
-}
+/// Bending at point i: k_kappa (kappa - kappa_r)^2 dl / 2.
+template <class Real> struct Bend : Squares<Real, 1, 2> {
+    using L = Lanes<Real>;
+    Vec3<Real> c;
+    L cc, open; // |c|^2; stiffness across c by both edges, where the bend is open wider than at rest
+
+    /// Two guards that keep the gradient exact: |e| counts at least 0.1 (a fold sharper than 168 degrees), and
+    /// |c| is rounded by 1e-4 of its rest value, where kappa of curly hair has a cusp.
+    RINGLET_INLINE Bend(const Block<Real> &b, const Edges<Real> &edges, int i, const Scale<Real> &scale)
+        : c(edges.d[i] - edges.d[i - 1]), cc(dot(c, c)) {
+        const L least = splat(Real(1e-2)), zero = splat(Real(0)), kappa_r = b.kappa_r[i];
+        const L il0 = edges.il[i - 1], il1 = edges.il[i];
+        const Vec3<Real> e = edges.d[i] + edges.d[i - 1];
+        const L ee = dot(e, e), rounding = Real(1e-4) * kappa_r * b.dl[i], rounded = cc + rounding * rounding;
+        const L inverse_ee = reciprocal<Real>(maximum<Real>(ee, least));
+        // With ratio = |c| / |e| and its inverse where there is a bend: kappa = 2 / dl ratio, and by c and e its
+        // derivatives are by_c c and by_e e
+        const L square = rounded * inverse_ee;
+        const L inverse_ratio = select<Real>(rounded > zero, inverse_root<Real>(square), zero);
+        const L root = scale.root * b.root_kappa * b.root_dl[i], twice = 2 * root * b.inverse_dl[i];
+        const L kappa = twice * square * inverse_ratio;
+        const L by_c = twice * inverse_ee * inverse_ratio;
+        const L by_e = select<Real>(ee > least, -kappa * inverse_ee, zero);
+        this->r[0] = kappa - root * kappa_r;
+        // Their part along an edge is the same for both: d.e = ee / 2, d.c = +- cc / 2
+        const L along = Real(0.5) * (by_e * ee + by_c * cc);
+        const Vec3<Real> turn_c = by_c * c, turn_e = by_e * e;
+        this->g[0][0] = il0 * (turn_e - turn_c - along * edges.d[i - 1]);
+        this->g[0][1] = il1 * (turn_e + turn_c - along * edges.d[i]);
+        open = maximum<Real>(1 - Real(0.5) * kappa_r * b.dl[i] * inverse_ratio, zero) * (twice * twice) * inverse_ee *
+               (il0 * il1) * scale.undamped;
+    }
+};
 
 /// Adds the gradient of bending over all inner points; returns the energy.
 template <class Real> Lanes<Real> add_bending(const Block<Real> &b, Edges<Real> &edges) {
     Lanes<Real> energy{};
-    for (int i = 1; i < b.P - 1; ++i) energy += add_bend_gradient(b, Bend<Real>(b, edges, i), edges, i);
+    for (int i = 1; i < b.P - 1; ++i)
+        energy += Bend<Real>(b, edges, i, Scale<Real>{}).add_gradient({}, edges.F + i - 1);
     return energy;
 }
 
-/// Adds the gradient of "rotor" about segment i; returns the energy
-///     G/2 |sqrt(rho) R(phi_r) beta_i - beta_{i+1} / sqrt(rho)|^2,   beta = d x d.
-template <class Real> RINGLET_INLINE Lanes<Real> add_rotor_gradient(const Block<Real> &b, Edges<Real> &edges, int i) {
-    const Vec3<Real> d0 = edges.d[i - 1], d1 = edges.d[i], d2 = edges.d[i + 1];
-    const Lanes<Real> G = b.G[i], C = G * b.C[i], S = G * b.S[i];
-    const Lanes<Real> R = G * b.root[i] * b.root[i], I = G * b.inverse_root[i] * b.inverse_root[i];
-    Lanes<Real> p = dot(d0, d1), q = dot(d1, d2);
-    Vec3<Real> d12 = cross(d1, d2), d01 = cross(d0, d1), d20 = cross(d2, d0);
-    Lanes<Real> u0 = R * p + C * q, u2 = I * q + C * p;
-    edges.D[i - 1] = edges.D[i - 1] - (u0 * d1 - C * d2 + S * d12);
-    edges.D[i] = edges.D[i] - (u0 * d0 + u2 * d2 + S * d20);
-    edges.D[i + 1] = edges.D[i + 1] - (u2 * d1 - C * d0 + S * d01);
-    return Real(0.5) * (R * (1 - p * p) + I * (1 - q * q)) - C * (p * q - dot(d0, d2)) - S * dot(d0, d12);
+/// Two unit vectors that make a right-handed orthonormal basis with d
+/// ("Building an orthonormal basis, revisited", Duff et al. 2017).
+template <class Real> RINGLET_INLINE void complete_basis(Vec3<Real> d, Vec3<Real> (&m)[2]) {
+    Lanes<Real> sign = d.z >= 0 ? splat(Real(1)) : splat(Real(-1));
+    Lanes<Real> a = -reciprocal<Real>(sign + d.z), xy = d.x * d.y * a;
+    m[0] = {1 + sign * d.x * d.x * a, sign * xy, -sign * d.x};
+    m[1] = {xy, sign + d.y * d.y * a, -d.y};
 }
+
+/// "rotor" about segment i: |r|^2 / 2 with r = sqrt(G rho) R(phi_r) beta_i - sqrt(G / rho) beta_{i+1}, beta = d x d. Its
+/// two residuals are m.r for an orthonormal basis m_0, m_1, d_1. With t = sqrt(G rho) R^T m
+///     r_0 = t_1.d_0 + sqrt(G/rho) m_1.d_2,    r_1 = -t_0.d_0 - sqrt(G/rho) m_0.d_2
+/// since d_1 x m_0 = m_1 and so d_1 x t_0 = t_1. R also turns with d_1, but only along d_1, where r has nothing.
+template <class Real> struct Rotor : Squares<Real, 2, 3> {
+    using L = Lanes<Real>;
+
+    RINGLET_INLINE Rotor(const Block<Real> &b, const Edges<Real> &edges, int i, const Scale<Real> &scale) {
+        const Vec3<Real> d0 = edges.d[i - 1], d1 = edges.d[i], d2 = edges.d[i + 1];
+        const L il0 = edges.il[i - 1], il1 = edges.il[i], il2 = edges.il[i + 1];
+        const L before = scale.root * b.G_before[i], after = scale.root * b.G_after[i];
+        const L C = before * b.C[i], S = before * b.S[i];
+        Vec3<Real> m[2];
+        complete_basis(d1, m);
+        const Vec3<Real> t[2] = {C * m[0] - S * m[1], C * m[1] + S * m[0]};
+        const L t0 = dot(t[0], d0), t1 = dot(t[1], d0), m0 = dot(m[0], d2), m1 = dot(m[1], d2);
+        this->r[0] = t1 + after * m1, this->r[1] = -t0 - after * m0;
+        this->g[0][0] = il0 * (t[1] - t1 * d0), this->g[1][0] = il0 * (t0 * d0 - t[0]);
+        const L p = il1 * dot(d0, d1), u = C * p + after * (il1 * dot(d1, d2)), w = S * p;
+        this->g[0][1] = -w * m[0] - u * m[1], this->g[1][1] = u * m[0] - w * m[1];
+        const L end = after * il2;
+        this->g[0][2] = end * (m[1] - m1 * d2), this->g[1][2] = end * (m0 * d2 - m[0]);
+    }
+};
 
 /// Adds the gradient of "rotor" about segments 1 .. P-3; returns the energy.
 template <class Real> Lanes<Real> add_rotor(const Block<Real> &b, Edges<Real> &edges) {
     Lanes<Real> energy{};
-    for (int i = 1; i < b.P - 2; ++i) energy += add_rotor_gradient(b, edges, i);
+    for (int i = 1; i < b.P - 2; ++i)
+        energy += Rotor<Real>(b, edges, i, Scale<Real>{}).add_gradient({}, edges.F + i - 1);
     return energy;
 }
 
-/// Excess of the lecture's regularised torsion at a point, tau - s tau_r, and its gradient by the four edges d[0..3]
-/// around it, with |c|^2 + (0.3)^2 for |c|^2 and s = |c|^2 / (|c|^2 + (0.3)^2). The lecture's general form, for unequal
+/// "frenet" at point i, k_tau (tau - s tau_r)^2 dl / 2: the lecture's regularised torsion by the four edges around it,
+/// with |c|^2 + (0.3)^2 for |c|^2 and s = |c|^2 / (|c|^2 + (0.3)^2). The lecture's general form, for unequal
 /// spacing (see operators.hpp): q = w3 c3 / |e3| - w0 c0 / |e0|, with both weights 1 at equal spacing.
-template <class Real> struct FrenetTorsion {
+template <class Real> struct Frenet : Squares<Real, 1, 4> {
     using L = Lanes<Real>;
-    L excess;
-    Vec3<Real> by_d[4];
 
-    RINGLET_INLINE FrenetTorsion(const Block<Real> &b, const Edges<Real> &edges, int i) {
+    RINGLET_INLINE Frenet(const Block<Real> &b, const Edges<Real> &edges, int i, const Scale<Real> &scale) {
         const Vec3<Real> *d = edges.d + i - 2;
         const L dl = b.dl[i], tau_r = b.tau_r[i], before = b.l[i - 1], after = b.l[i];
         const L w0 = after * b.inverse_l[i - 1] * dl * b.inverse_dl[i - 1];
@@ -139,33 +185,25 @@ template <class Real> struct FrenetTorsion {
         Vec3<Real> q = i3 * c3 - i0 * c0, ec = cross(e, c);
         L inverse_cc = reciprocal<Real>(dot(c, c) + Real(kFrenetSquare)), s = dot(c, c) * inverse_cc;
         L alpha = Real(0.5) * inverse_cc * b.inverse_dl[i], tau = alpha * dot(ec, q);
-        excess = tau - s * tau_r;
+        const L root = scale.root * b.root_tau * b.root_dl[i];
+        this->r[0] = root * (tau - s * tau_r);
         // the chain rule, by c and e of the three points
         Vec3<Real> by_e = alpha * cross(c, q);
         Vec3<Real> by_c = alpha * cross(q, e) - (2 * inverse_cc * (tau + tau_r * (1 - s))) * c;
         Vec3<Real> by_c3 = (alpha * i3) * ec, by_c0 = (-alpha * i0) * ec;
         Vec3<Real> by_e3 = select<Real>(ee3 > least, -alpha * i3 * j3 * dot(c3, ec), zero) * e3;
         Vec3<Real> by_e0 = select<Real>(ee0 > least, alpha * i0 * j0 * dot(c0, ec), zero) * e0;
-        by_d[0] = by_e0 - by_c0;
-        by_d[1] = by_e0 + by_c0 + by_e - by_c;
-        by_d[2] = by_e + by_c + by_e3 - by_c3;
-        by_d[3] = by_e3 + by_c3;
+        const Vec3<Real> by_d[4] = {by_e0 - by_c0, by_e0 + by_c0 + by_e - by_c, by_e + by_c + by_e3 - by_c3,
+                                    by_e3 + by_c3};
+        for (int k = 0; k < 4; ++k) this->g[0][k] = turning(root * by_d[k], d[k], edges.il[i - 2 + k]);
     }
 };
-
-/// Adds the gradient of k_tau (tau - s tau_r)^2 dl / 2 at point i; returns the energy.
-template <class Real>
-RINGLET_INLINE Lanes<Real> add_frenet_gradient(const Block<Real> &b, const FrenetTorsion<Real> &torsion,
-                                               Edges<Real> &edges, int i) {
-    Lanes<Real> moment = b.k_tau * b.dl[i] * torsion.excess;
-    for (int k = 0; k < 4; ++k) edges.D[i - 2 + k] = edges.D[i - 2 + k] + moment * torsion.by_d[k];
-    return Real(0.5) * moment * torsion.excess;
-}
 
 /// Adds the gradient of "frenet" at points 2 .. P-3; returns the energy.
 template <class Real> Lanes<Real> add_frenet(const Block<Real> &b, Edges<Real> &edges) {
     Lanes<Real> energy{};
-    for (int i = 2; i < b.P - 2; ++i) energy += add_frenet_gradient(b, FrenetTorsion<Real>(b, edges, i), edges, i);
+    for (int i = 2; i < b.P - 2; ++i)
+        energy += Frenet<Real>(b, edges, i, Scale<Real>{}).add_gradient({}, edges.F + i - 2);
     return energy;
 }
 

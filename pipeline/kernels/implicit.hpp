@@ -34,16 +34,11 @@ template <class Real> struct Drag {
     }
 };
 
-/// What pulls the two ends of edge j together, elastic force and tension: minus it at its tip.
-template <class Real>
-RINGLET_INLINE Vec3<Real> edge_force(const Edges<Real> &edges, const Lanes<Real> *T, int j) {
-    return turning(edges.D[j], edges.d[j], edges.il[j]) + T[j] * edges.d[j];
-}
-
 /// Elastic and tension forces and the load, over m0, P entries.
 template <class Real>
 void steady_forces(const Block<Real> &b, const StepSettings &settings, const Motion<Real> &from, Edges<Real> &edges,
                    Vec3<Real> *f) {
+    edges.set(from.x, b.P);
     if (settings.torsion == Torsion::kirchhoff) {
         add_rod(b, from.m, from.twist, edges);
     } else {
@@ -52,21 +47,20 @@ void steady_forces(const Block<Real> &b, const StepSettings &settings, const Mot
     }
     Vec3<Real> before{};
     for (int j = 0; j < b.P; ++j) {
-        const Vec3<Real> now = j < b.P - 1 ? edge_force(edges, from.T, j) : Vec3<Real>{};
+        const Vec3<Real> now = j < b.P - 1 ? edges.F[j] + from.T[j] * edges.d[j] : Vec3<Real>{};
         f[j] = b.load[j] + b.per_mass * (now - before);
         before = now;
     }
 }
 
-/// What one solve reads, and the forces: the first solve of a step fills them in.
+/// What one solve reads.
 template <class Real> struct Equation {
     const Block<Real> &b;
     const Motion<Real> &from;
     const Interval<Real> &step;
     const StepSettings &settings;
     const Contacts<Real> &contacts;
-    Edges<Real> &edges;
-    Vec3<Real> *f; // steady forces over m0
+    const Edges<Real> &edges;
     const Outside<Real> *outside = nullptr; // forces of other strands
 };
 
@@ -76,74 +70,70 @@ template <class Real> struct Velocities {
     Lanes<Real> *spin; // of s; only "kirchhoff" solves for it
 };
 
-/// Mass, drag, the row of a contact on the diagonal, and the right side of point i.
-template <class Real, class Window>
-RINGLET_INLINE void add_point(const Equation<Real> &eq, int i, Window &window) {
+/// Mass and drag of point i, and the right side; `pull` is what the edges beside it pull, over m0.
+template <class Real, class Rows>
+RINGLET_INLINE void add_point(const Equation<Real> &eq, int i, Vec3<Real> pull, Rows &rows) {
     const Block<Real> &b = eq.b;
-    const Real dt = Real(eq.step.dt), theta = Real(eq.settings.theta), theta_dt = theta * dt;
-    const Vec3<Real> v = eq.from.v[i];
+    const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
     const Drag<Real> drag(b, eq.from, i, eq.settings, eq.step.wind);
-    Lanes<Real> block[6];
-    outer(drag.t, block, theta_dt * (drag.c_par - drag.c_perp), 1 + theta_dt * drag.c_perp);
+    Outer<Real> block(drag.t, theta_dt * (drag.c_par - drag.c_perp), 1 + theta_dt * drag.c_perp);
     Vec3<Real> push = eq.step.gravity + drag.push;
     if (eq.outside) {
-        add_rate(*eq.outside, i, splat(theta_dt), block);
+        add_rate(*eq.outside, i, splat(theta_dt), block.entries);
         push = push + eq.outside->push[i];
     }
-    window.template add_block<0, 0>(b.mu[i], block);
-    window.add_right(b.mu[i] * v + splat(theta_dt) * (eq.f[i] + b.mu[i] * push));
-    if (!eq.contacts.any_row || !any<Real>(eq.contacts.row[i] > 0)) return;
-    // A contact's row: theta k dt^2 n n^T with k = 1e3 / dt^2, and its right side
-    const Vec3<Real> n = eq.contacts.n[i];
-    const Lanes<Real> k = (theta * Real(kRow)) * eq.contacts.row[i];
-    outer(n, block, k, splat(Real(0)));
-    window.template add_block<0, 0>(splat(Real(1)), block);
-    window.add_right((k * (dot(n, v) - eq.contacts.gap[i] / dt)) * n);
+    for (int r = 0; r < 3; ++r)
+        for (int c = r; c < 3; ++c) rows.entries[r][c] += b.mu[i] * block.at(r, c);
+    const Vec3<Real> right = b.mu[i] * (eq.from.v[i] + splat(theta_dt) * push) + splat(theta_dt) * (pull + b.load[i]);
+    rows.right[0] = right.x, rows.right[1] = right.y, rows.right[2] = right.z;
 }
 
-/// Unknowns that the terms beginning at one point reach.
+/// The row of a contact at point i: theta k dt^2 n n^T with k = 1e3 / dt^2, and its right side.
+template <class Real, class Window> RINGLET_INLINE void add_contact(const Equation<Real> &eq, int i, Window &window) {
+    if (!any<Real>(eq.contacts.row[i] > 0)) return;
+    const Vec3<Real> n = eq.contacts.n[i];
+    const Lanes<Real> k = (Real(eq.settings.theta) * Real(kRow)) * eq.contacts.row[i];
+    window.add_row(n, k, dot(n, eq.from.v[i]) - eq.contacts.gap[i] / Real(eq.step.dt));
+}
+
+/// Edges that a joint of the model reaches.
 template <Torsion torsion>
-inline constexpr int kBand = torsion == Torsion::rotor       ? 12
-                             : torsion == Torsion::frenet    ? 15
-                             : torsion == Torsion::kirchhoff ? 11
-                                                             : 9;
+inline constexpr int kSpan = torsion == Torsion::rotor ? 3 : torsion == Torsion::frenet ? 4 : 2;
 
 /// The solver of one torsion model; it has memory for P points.
 template <class Real, Torsion torsion> class Solver {
     using L = Lanes<Real>;
     static constexpr bool turns = torsion == Torsion::kirchhoff;
-    static constexpr int Unknowns = turns ? 4 : 3, Band = kBand<torsion>;
-    using System = Window<Real, Unknowns, Band>;
+    static constexpr int Unknowns = turns ? 4 : 3;
+    using System = Assembly<Real, Unknowns, kSpan<torsion>>;
+    static constexpr int Band = System::Band, Reach = System::Reach;
+    using PointRows = Rows<Real, Unknowns, Band>;
 
   public:
-    Solver(Arena &arena, int P) : pivots_(arena.take<Pivots<Real, Unknowns, Band>>(P)) {}
+    Solver(Arena &arena, int P)
+        : kept_(arena.take<PointRows>(P)), pivots_(arena.take<Pivots<Real, Unknowns, Band>>(P)) {}
 
-    /// Solves for the velocities. `again`: the forces are known from a solve before.
+    /// Solves for the velocities. `again`: as before but for the rows of contacts.
     void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
         const Block<Real> &b = eq.b;
-        const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
-        const L scale = splat(theta_dt * (theta_dt + Real(eq.settings.damping))) * b.per_mass;
         const int first = turns ? std::max(b.first - 1, 0) : b.first; // segment first - 1 turns
-        System window;
-        Vec3<Real> before{};
-        window.clear();
+        const Scale<Real> scale = stiffness_scale(eq);
+        System assembly;
+        Window<Real, Unknowns, Band> window;
         for (int i = 0; i < b.P; ++i) {
-            add_terms(eq, i, !again, scale, window);
-            if constexpr (torsion == Torsion::rotor)
-                if (i == 0 && b.clamped)
-                    add_root(b, eq.edges, eq.from.m[0], to.spin[0] * eq.edges.il[0], !again, scale, window);
-            if (!again) {
-                const Vec3<Real> now = i + 1 < b.P ? edge_force(eq.edges, eq.from.T, i) : Vec3<Real>{};
-                eq.f[i] = b.load[i] + b.per_mass * (now - before);
-                before = now;
+            if (again) {
+                window.rows = kept_[i];
+            } else {
+                assemble(eq, i, scale, to, assembly, window.rows);
+                if (eq.contacts.any_row) kept_[i] = window.rows;
             }
             const Values known = known_at(i, to);
             if (i < first) {
                 window.pass(known.value);
                 continue;
             }
-            add_point(eq, i, window);
-            if constexpr (turns) add_turn(eq, i, window);
+            if (eq.contacts.any_row) add_contact(eq, i, window);
+            window.complete();
             if (b.held_inside || i < b.first) window.impose(held_at(b, i).value, known.value);
             window.eliminate(pivots_[i]);
         }
@@ -160,6 +150,7 @@ template <class Real, Torsion torsion> class Solver {
         L value[Unknowns];
     };
 
+    PointRows *kept_; // rows without contacts, for another solve
     Pivots<Real, Unknowns, Band> *pivots_;
 
     RINGLET_INLINE static Values known_at(int i, const Velocities<Real> &at) {
@@ -173,27 +164,97 @@ template <class Real, Torsion torsion> class Solver {
         else return {{held, held, held}};
     }
 
-    /// The row of s of segment i; the last point has no segment.
-    RINGLET_INLINE static void add_turn(const Equation<Real> &eq, int i, System &window) {
-        window.at(3, 3) += splat(i + 1 < eq.b.P ? Real(kSpin) : Real(1));
-        if (i + 1 == eq.b.P) return;
+    /// theta dt (theta dt + beta) over m0, and its part without beta.
+    static Scale<Real> stiffness_scale(const Equation<Real> &eq) {
         const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
-        window.right[3] -= theta_dt * eq.b.per_mass * eq.edges.il[i] * eq.edges.D_theta[i];
+        const L square = splat(theta_dt * (theta_dt + Real(eq.settings.damping))) * eq.b.per_mass;
+        return {square_root<Real>(square), 1 / square, theta_dt / (theta_dt + Real(eq.settings.damping))};
     }
 
-    /// The terms that begin at point i.
-    RINGLET_INLINE void add_terms(const Equation<Real> &eq, int i, bool force, L scale, System &window) {
+    /// The rows of point i without contacts.
+    RINGLET_INLINE static void assemble(const Equation<Real> &eq, int i, const Scale<Real> &scale,
+                                        const Velocities<Real> &known, System &assembly, PointRows &rows) {
         const Block<Real> &b = eq.b;
-        if constexpr (turns) {
-            if (i + 2 < b.P) add_joint(b, eq.from, eq.edges, i + 1, force, scale, window);
-        } else {
-            if (i + 2 < b.P) add_bend(b, eq.edges, i + 1, force, scale, window);
+        assembly.open();
+        Outer<Real> stretching;
+        if (i + 1 < b.P) {
+            stretching = stretch(b, eq.edges, i, eq.from.T[i], eq.step.dt, eq.settings.theta);
+            assembly.edge(0) = assembly.edge(0) + eq.from.T[i] * eq.edges.d[i];
         }
+        if constexpr (turns) add_joint(eq, i, scale, stretching, assembly);
+        else add_joints(eq, i, scale, stretching, assembly);
         if constexpr (torsion == Torsion::rotor)
-            if (i + 3 < b.P) add_rotor(b, eq.edges, i + 1, force, scale, window);
+            if (i == 0 && b.clamped) add_root(eq, scale, known.spin[0] * eq.edges.il[0], assembly);
+#pragma GCC unroll 4
+        for (int a = 0; a < Unknowns; ++a) assembly.row(a, rows.entries[a]);
+        add_point(eq, i, b.per_mass * assembly.pull(), rows);
+        if constexpr (turns) add_turn(eq, i, assembly.fourth(0), rows);
+    }
+
+    /// The row of s of segment i; the last point has no segment.
+    RINGLET_INLINE static void add_turn(const Equation<Real> &eq, int i, L F_theta, PointRows &rows) {
+        const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
+        const bool is_last = i + 1 == eq.b.P;
+        rows.entries[3][3] += splat(is_last ? Real(1) : Real(kLeastSpin));
+        rows.right[3] = is_last ? L{} : -theta_dt * eq.b.per_mass * eq.edges.il[i] * F_theta;
+    }
+
+    /// Bending and torsion that begin with edge i, and the stiffness by that edge.
+    RINGLET_INLINE static void add_joints(const Equation<Real> &eq, int i, const Scale<Real> &scale,
+                                          const Outer<Real> &stretching, System &assembly) {
+        const Block<Real> &b = eq.b;
+        BendStiffness<Real> bending;
+        if (i + 2 < b.P) {
+            const Bend<Real> bend(b, eq.edges, i + 1, scale);
+            bend.add_gradient(scale, &assembly.edge(0));
+            bending = BendStiffness<Real>(bend);
+        }
+        L g[torsion == Torsion::rotor ? 2 : 1][Reach]{};
+        if constexpr (torsion == Torsion::rotor)
+            if (i + 3 < b.P) add_rows(Rotor<Real>(b, eq.edges, i + 1, scale), scale, assembly, g);
         if constexpr (torsion == Torsion::frenet)
-            if (i + 4 < b.P) add_frenet(b, eq.edges, i + 2, force, scale, window);
-        if (i + 1 < b.P) add_stretch(b, eq.edges, i, eq.from.T[i], scale, Real(eq.step.dt), window);
+            if (i + 4 < b.P) add_rows(Frenet<Real>(b, eq.edges, i + 2, scale), scale, assembly, g);
+        assembly.fill(g, [&](int row, int column, L &sum) RINGLET_ALWAYS {
+            bending.add(row, column, sum);
+            if (column < 3) sum += stretching.at(row, column);
+        });
+    }
+
+    template <int Count, int Edges>
+    RINGLET_INLINE static void add_rows(const Squares<Real, Count, Edges> &joint, const Scale<Real> &scale,
+                                        System &assembly, L (&g)[Count][Reach]) {
+        joint.add_gradient(scale, &assembly.edge(0));
+        write_rows(joint, g);
+    }
+
+    /// "rotor" at a clamped root; its director turns at a known rate [1/s].
+    RINGLET_INLINE static void add_root(const Equation<Real> &eq, const Scale<Real> &scale, L rate, System &assembly) {
+        RootBend<Real> root(eq.b, eq.edges, eq.from.m[0], scale);
+        L g[2][6];
+        write_rows(root, g);
+        for (int a = 0; a < 2; ++a) {
+            for (int r = 0; r < 6; ++r)
+                for (int c = r; c < 6; ++c) assembly.at(r, c) += g[a][r] * g[a][c];
+            root.r[a] += Real(eq.settings.theta * eq.step.dt + eq.settings.damping) * root.by_theta[a] * rate;
+        }
+        root.add_gradient(scale, &assembly.edge(0));
+    }
+
+    /// The joint of "kirchhoff" that begins with edge i, and the stiffness by that edge.
+    RINGLET_INLINE static void add_joint(const Equation<Real> &eq, int i, const Scale<Real> &scale,
+                                         const Outer<Real> &stretching, System &assembly) {
+        const Block<Real> &b = eq.b;
+        RodRows<Real> rows{};
+        if (i + 2 < b.P) {
+            const Joint<Real> q(eq.edges.d[i], eq.edges.d[i + 1], eq.from.m[i], eq.from.m[i + 1], eq.from.twist[i + 1]);
+            add_joint_gradient(Moments<Real>(b, i + 1, q), q, eq.edges, i + 1, &assembly.edge(0), &assembly.fourth(0));
+            rows = RodRows<Real>(b, eq.edges, i + 1, q, scale);
+        }
+        assembly.fill(rows.row, [&](int row, int column, L &sum) RINGLET_ALWAYS {
+            if (row % 4 == 3 && column % 4 == 3) sum += rows.turning[row / 4] * rows.turning[column / 4];
+            if (row % 4 == 3 && column == row) sum += rows.least[row / 4];
+            if (column < 3) sum += stretching.at(row, column);
+        });
     }
 };
 

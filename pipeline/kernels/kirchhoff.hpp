@@ -24,9 +24,11 @@ namespace ringlet {
 
 /// 1 + p counts at least this much: a fold sharper than 180 - 0.1 degrees (168 in float32).
 template <class Real> inline constexpr Real kFold = sizeof(Real) == 4 ? Real(1e-2) : Real(1e-6);
-/// The matrix takes this part of a segment's mass as inertia of its spin: a free rod may turn about itself. (That of a
-/// fibre, m r^2 / (2 l^2), is about 1e-5.)
-inline constexpr double kSpin = 1e-4;
+/// Nothing may hold the directors of a free rod: this part of their stiffness does, in every matrix, and where there is
+/// none either this part of a point's mass. (As inertia it would brake a strand that turns, the more the shorter the
+/// step: test_a_free_curl_keeps_its_angular_momentum.)
+template <class Real> inline constexpr Real kLeastTwisting = sizeof(Real) == 4 ? Real(1e-5) : Real(1e-9);
+inline constexpr double kLeastSpin = 1e-9;
 
 /// x rounded to the nearest integer: adding 1.5 2^52 (2^23) leaves no digits after the point.
 template <class Real> RINGLET_INLINE Lanes<Real> nearest(Lanes<Real> x) {
@@ -103,18 +105,19 @@ template <class Real> struct Moments {
     }
 };
 
-/// Adds the gradient of a joint's energy to the two edges beside it. With h = (M1 k1 + M2 k2) / 4 and the binormal kb:
+/// Adds the gradient of a joint's energy by the two edges beside it, F[0] and F[1], and by their directors. With h = (M1 k1 + M2 k2) / 4 and the binormal kb:
 ///     dE/dt  = -(M1 + h k1) a1 - (M2 + h k2) a2 + (Q/2) kb,    dE/dtheta_{i-1} = (M1 k2 - M2 k1) / 2 - Q
 ///     dE/dt' = +(M1 + h k1) b1 + (M2 + h k2) b2 + (Q/2) kb,    dE/dtheta_i     = (M1 k2 - M2 k1) / 2 + Q
 template <class Real>
-RINGLET_INLINE void add_joint_gradient(const Moments<Real> &at, const Joint<Real> &q, Edges<Real> &edges, int i) {
+RINGLET_INLINE void add_joint_gradient(const Moments<Real> &at, const Joint<Real> &q, const Edges<Real> &edges, int i,
+                                       Vec3<Real> *F, Lanes<Real> *F_theta) {
     const Lanes<Real> h = Real(0.25) * (at.M1 * q.k1 + at.M2 * q.k2), u1 = at.M1 + h * q.k1, u2 = at.M2 + h * q.k2;
     const Vec3<Real> across = u1 * q.a1 + u2 * q.a2, twisted = (Real(0.5) * at.Q) * q.binormal();
     const Lanes<Real> along = Real(0.5) * (u1 * q.k1 + u2 * q.k2), both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1);
-    edges.D[i - 1] = edges.D[i - 1] - across + twisted;
-    edges.D[i] = edges.D[i] + across - along * (edges.d[i - 1] + edges.d[i]) + twisted;
-    edges.D_theta[i - 1] += both - at.Q;
-    edges.D_theta[i] += both + at.Q;
+    F[0] = F[0] + edges.il[i - 1] * (twisted - across);
+    F[1] = F[1] + edges.il[i] * (twisted + across - along * (edges.d[i - 1] + edges.d[i]));
+    F_theta[0] += both - at.Q;
+    F_theta[1] += both + at.Q;
 }
 
 template <class Real> struct RodEnergy {
@@ -130,7 +133,7 @@ RodEnergy<Real> add_rod(const Block<Real> &b, const Vec3<Real> *m, const Lanes<R
         const Moments<Real> at(b, i, q);
         energy.bending += Real(0.5) * (at.M1 * (q.k1 - b.strain[i].x) + at.M2 * (q.k2 - b.strain[i].y));
         energy.twisting += Real(0.5) * at.Q * (q.twist - b.strain[i].z);
-        add_joint_gradient(at, q, edges, i);
+        add_joint_gradient(at, q, edges, i, edges.F + i - 1, edges.D_theta + i - 1);
     }
     return energy;
 }
@@ -142,16 +145,22 @@ RINGLET_INLINE Lanes<Real> turning_stiffness(const Block<Real> &b, int i, const 
     return (B1 - B2) * (q.k2 * q.k2 - q.k1 * q.k1) + B1 * b.strain[i].x * q.k1 + B2 * b.strain[i].y * q.k2;
 }
 
-/// The three Gauss-Newton rows of a joint: derivatives of k1, k2 and twist by x_{i-1}, s_{i-1}, x_i, s_i, x_{i+1}.
+/// The three Gauss-Newton rows of a joint: derivatives of k1, k2 and twist by edge i-1, s_{i-1}, edge i, s_i.
 /// The twist columns of k1 and k2 are not the exact ones, k2/2 and -k1/2: with
 ///     (k2 - f1 (k2 - r2)) / 2,  (f2 (k1 - r1) - k1) / 2,      f1 = min(1, B2/B1), f2 = min(1, B1/B2)
 /// K stays positive, the block of points and twist is exact for B1 = B2, and turning an isotropic section costs nothing.
 template <class Real> struct RodRows {
     using L = Lanes<Real>;
-    L row[3][11];
-    L turning; // what the exact stiffness of a common turn has on top, for each of the four entries of s and s
+    L row[3][8];
+    L turning[2]; // a fourth row that has s only: what the exact stiffness of a common turn has on top
+    L least[2];   // on the diagonal of s
 
-    RINGLET_INLINE RodRows(const Block<Real> &b, const Edges<Real> &edges, int i, const Joint<Real> &q) {
+    RodRows() = default;
+
+    RINGLET_INLINE RodRows(const Block<Real> &b, const Edges<Real> &edges, int i, const Joint<Real> &q,
+                           const Scale<Real> &scale) {
+        const L root = scale.root * b.root_dl[i] * b.inverse_dl[i];
+        const L weight[3] = {root * b.root_kappa, root * b.root_kappa_2, root * b.root_tau};
         const L il0 = edges.il[i - 1], il1 = edges.il[i], B1 = b.k_kappa, B2 = b.k_kappa_2, one = splat(Real(1));
         const Vec3<Real> tt = edges.d[i - 1] + edges.d[i], kb = splat(Real(0.5)) * q.binormal();
         const L f1 = minimum<Real>(one, b.k_ratio), f2 = minimum<Real>(one, b.inverse_ratio);
@@ -159,46 +168,26 @@ template <class Real> struct RodRows {
         const L c2 = Real(0.5) * (f2 * (q.k1 - b.strain[i].x) - q.k1);
         const Vec3<Real> qa = q.k1 * q.a1 + q.k2 * q.a2;
         const Vec3<Real> qb = qa - (Real(0.5) * (q.k1 * q.k1 + q.k2 * q.k2)) * tt;
-        set(0, -il0 * (q.a1 + (Real(0.25) * q.k1) * qa),
-            il1 * (q.a1 - (Real(0.5) * q.k1) * tt + (Real(0.25) * q.k1) * qb), c1 * il0, c1 * il1);
-        set(1, -il0 * (q.a2 + (Real(0.25) * q.k2) * qa),
-            il1 * (q.a2 - (Real(0.5) * q.k2) * tt + (Real(0.25) * q.k2) * qb), c2 * il0, c2 * il1);
-        set(2, il0 * kb, il1 * kb, -il0, il1);
+        const L before[3] = {weight[0] * il0, weight[1] * il0, weight[2] * il0};
+        const L after[3] = {weight[0] * il1, weight[1] * il1, weight[2] * il1};
+        set(0, -before[0] * (q.a1 + (Real(0.25) * q.k1) * qa),
+            after[0] * (q.a1 - (Real(0.5) * q.k1) * tt + (Real(0.25) * q.k1) * qb), c1 * before[0], c1 * after[0]);
+        set(1, -before[1] * (q.a2 + (Real(0.25) * q.k2) * qa),
+            after[1] * (q.a2 - (Real(0.5) * q.k2) * tt + (Real(0.25) * q.k2) * qb), c2 * before[1], c2 * after[1]);
+        set(2, before[2] * kb, after[2] * kb, -before[2], after[2]);
         const L more = turning_stiffness(b, i, q) - 4 * (B1 * c1 * c1 + B2 * c2 * c2);
-        turning = Real(0.25) * maximum<Real>(more, splat(Real(0)));
+        const L common = Real(0.5) * root * square_root<Real>(scale.undamped * maximum<Real>(more, splat(Real(0))));
+        turning[0] = common * il0, turning[1] = common * il1;
+        const L held = kLeastTwisting<Real> * (weight[0] * weight[0] + weight[2] * weight[2]);
+        least[0] = held * il0 * il0, least[1] = held * il1 * il1;
     }
 
   private:
-    /// Entries of a row from its derivatives by the two tangents (over the lengths) and the two s.
     RINGLET_INLINE void set(int r, Vec3<Real> D0, Vec3<Real> D1, L s0, L s1) {
-        const Vec3<Real> middle = D0 - D1;
         L *g = row[r];
-        g[0] = -D0.x, g[1] = -D0.y, g[2] = -D0.z, g[3] = s0;
-        g[4] = middle.x, g[5] = middle.y, g[6] = middle.z, g[7] = s1;
-        g[8] = D1.x, g[9] = D1.y, g[10] = D1.z;
+        g[0] = D0.x, g[1] = D0.y, g[2] = D0.z, g[3] = s0;
+        g[4] = D1.x, g[5] = D1.y, g[6] = D1.z, g[7] = s1;
     }
 };
-
-/// What joint i adds to the system of a step: its gradient where `force` is set, and scale times its stiffness to a
-/// window of a banded matrix that begins at point i - 1.
-template <class Real, class Window>
-RINGLET_INLINE void add_joint(const Block<Real> &b, const Motion<Real> &from, Edges<Real> &edges, int i, bool force,
-                              Lanes<Real> scale, Window &window) {
-    const Joint<Real> q(edges.d[i - 1], edges.d[i], from.m[i - 1], from.m[i], from.twist[i]);
-    if (force) add_joint_gradient(Moments<Real>(b, i, q), q, edges, i);
-    const RodRows<Real> rows(b, edges, i, q);
-    const Lanes<Real>(&g)[3][11] = rows.row, per_length = scale * b.inverse_dl[i];
-    const Lanes<Real> w[3] = {per_length * b.k_kappa, per_length * b.k_kappa_2, per_length * b.k_tau};
-#pragma GCC unroll 11
-    for (int r = 0; r < 11; ++r) {
-        const Lanes<Real> w0 = w[0] * g[0][r], w1 = w[1] * g[1][r], w2 = w[2] * g[2][r];
-#pragma GCC unroll 11
-        for (int c = r; c < 11; ++c) window.at(r, c) += w0 * g[0][c] + w1 * g[1][c] + w2 * g[2][c];
-    }
-    const Lanes<Real> il0 = edges.il[i - 1], il1 = edges.il[i], turning = per_length * rows.turning;
-    window.at(3, 3) += turning * il0 * il0;
-    window.at(3, 7) += turning * il0 * il1;
-    window.at(7, 7) += turning * il1 * il1;
-}
 
 } // namespace ringlet

@@ -17,35 +17,30 @@
 
 namespace ringlet {
 
-/// The two residuals and their derivatives by d_0 (m and n go along by parallel transport), d_1 and a turn theta_0.
-template <class Real> struct RootBend {
+/// The two residuals and their derivatives by edges 0 (m and n go along by parallel transport) and 1, and by a turn
+/// theta_0.
+template <class Real> struct RootBend : Squares<Real, 2, 2> {
     using L = Lanes<Real>;
-    L r[2];
-    Vec3<Real> by_d0[2], by_d1[2];
     L by_theta[2];
 
-    RINGLET_INLINE RootBend(const Block<Real> &b, const Edges<Real> &edges, Vec3<Real> m) {
-        const Vec3<Real> d0 = edges.d[0], d1 = edges.d[1], n = cross(d0, m);
-        const L p = dot(d0, d1), along_m = dot(d1, m), along_n = dot(d1, n);
-        r[0] = along_m - b.root_bend[0], r[1] = along_n - b.root_bend[1];
-        by_d0[0] = -p * m, by_d0[1] = -p * n;
-        by_d1[0] = m, by_d1[1] = n;
-        by_theta[0] = along_n, by_theta[1] = -along_m;
+    RINGLET_INLINE RootBend(const Block<Real> &b, const Edges<Real> &edges, Vec3<Real> m, const Scale<Real> &scale) {
+        const L root = scale.root * square_root<Real>(b.root_weight);
+        const Vec3<Real> d0 = edges.d[0], d1 = edges.d[1], frame[2] = {m, cross(d0, m)};
+        const L p = dot(d0, d1), along[2] = {dot(d1, frame[0]), dot(d1, frame[1])};
+        for (int a = 0; a < 2; ++a) {
+            this->r[a] = root * (along[a] - b.root_bend[a]);
+            this->g[a][0] = turning((-root * p) * frame[a], d0, edges.il[0]);
+            this->g[a][1] = turning(root * frame[a], d1, edges.il[1]);
+        }
+        by_theta[0] = root * along[1], by_theta[1] = -root * along[0];
     }
 };
 
 /// Adds the gradient with the director m of segment 0; returns the energy.
 template <class Real>
-RINGLET_INLINE Lanes<Real> add_root_gradient(const Block<Real> &b, const RootBend<Real> &root, Edges<Real> &edges) {
-    Lanes<Real> energy{};
-    for (int a = 0; a < 2; ++a) {
-        const Lanes<Real> moment = b.root_weight * root.r[a];
-        edges.D[0] = edges.D[0] + moment * root.by_d0[a];
-        edges.D[1] = edges.D[1] + moment * root.by_d1[a];
-        edges.D_theta[0] += moment * root.by_theta[a];
-        energy += Real(0.5) * moment * root.r[a];
-    }
-    return energy;
+RINGLET_INLINE Lanes<Real> add_root_gradient(const RootBend<Real> &root, Edges<Real> &edges) {
+    for (int a = 0; a < 2; ++a) edges.D_theta[0] += root.r[a] * root.by_theta[a];
+    return root.add_gradient({}, edges.F);
 }
 
 /// Adds the gradient of torsion with the directors m: over the strand, and at the root where that is clamped.
@@ -55,7 +50,7 @@ Lanes<Real> add_torsion(Torsion torsion, const Block<Real> &b, const Vec3<Real> 
     if (torsion == Torsion::frenet) energy = add_frenet(b, edges);
     if (torsion != Torsion::rotor) return energy;
     energy = add_rotor(b, edges);
-    return b.clamped ? energy + add_root_gradient(b, RootBend<Real>(b, edges, m[0]), edges) : energy;
+    return b.clamped ? energy + add_root_gradient(RootBend<Real>(b, edges, m[0], {}), edges) : energy;
 }
 
 } // namespace ringlet

@@ -29,7 +29,8 @@ template <class Real> using Mask = typename LaneTypes<Real>::Mask;
 /// Strands in a block.
 template <class Real> inline constexpr int kLanes = 64 / int(sizeof(Real));
 
-#define RINGLET_INLINE inline __attribute__((always_inline))
+#define RINGLET_ALWAYS __attribute__((always_inline)) // for lambdas
+#define RINGLET_INLINE inline RINGLET_ALWAYS
 
 template <class Real> RINGLET_INLINE Lanes<Real> splat(Real value) { return Lanes<Real>{} + value; }
 

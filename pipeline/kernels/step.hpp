@@ -45,7 +45,7 @@ template <class Real> class Stepper {
 
     /// Bytes that a Stepper takes from its arena.
     static size_t bytes(int P) {
-        constexpr size_t pivots = 3 * 15, motions = 2 + 2 * kHalvings, points = 112;
+        constexpr size_t pivots = 2 * (4 * 15 + 8), motions = 2 + 2 * kHalvings, points = 112;
         return sizeof(L) * ((pivots + 12 * motions + points) * P + 4096);
     }
 
@@ -139,7 +139,7 @@ template <class Real> class Stepper {
         const Real dt = Real(interval.dt);
         const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
         move_held(interval, from, to);
-        edges_.set(from.x, block.P);
+        edges_.follow(from.x, block.P);
         hold_directors(interval, from, to);
         contacts.find_rows(block, head, from, dt);
         if (settings_.is_explicit) explicit_velocities(interval, from, to);
@@ -176,7 +176,7 @@ template <class Real> class Stepper {
 
     /// Banded solve; rows that would pull are dropped and the system is solved again.
     void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
-        const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, f_, outside};
+        const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, outside};
         for (int again = 0;; ++again) {
             ++tally.solves;
             solvers_.solve(equation, again > 0, {u_, directors_.spin});

@@ -1,10 +1,12 @@
-// What each joint and segment adds to the system of a step: its force, and its stiffness scaled by `scale`.
+// What each joint and segment adds to the system of a step: its gradient to the edges, its stiffness to the assembly.
 //
-//     K = sum k_kappa dl grad(kappa) grad(kappa)^T + max(0, 1 - kappa_r/kappa) transverse bending
-//         + torsion Gauss-Newton + k_s d d^T + (T/l)^+ (I - d d^T)      (physics.md section 3)
-//     k_s = max(1e3 m0/dt^2, 10 T/l)
-// Every function here takes the window whose first point is the first that it touches; `force` says whether the
-// gradient is added to the edges too (not when a system is solved again).
+//     K = sum g g^T (Gauss-Newton, for bending and torsion) + max(0, 1 - kappa_r/kappa) transverse bending
+//         + k_s d d^T + (T/l)^+ (I - d d^T),      k_s = max(1e3 m0/dt^2, 10 T/l)      (physics.md section 3)
+// The exact g g^T of bending is needed: without it tight curls blow up at 2 ms. All is by edges: see banded.hpp.
+// Internal damping is beta times the g g^T only, which a rigid turn leaves alone. The other stiffness would brake it: k_s
+// the more, the shorter the step (test_the_motion_converges_with_damping). The tension is that of the step's end,
+// whatever theta is: with theta's mean it rings, and tight curls never rest at 1/60 s
+// (test_tight_curls_come_to_rest_in_long_steps).
 #pragma once
 
 #include "banded.hpp"
@@ -19,122 +21,61 @@ RINGLET_INLINE Lanes<Real> stretch_stiffness(const Block<Real> &b, Lanes<Real> T
     return maximum<Real>(splat(Real(1e3) / (dt * dt)), 10 * T * b.inverse_l[j] * b.per_mass);
 }
 
-/// w a a^T + diagonal I, as the 6 entries of a symmetric block.
+/// The symmetric 3x3 block w a a^T + diagonal I: its entries xx, xy, xz, yy, yz, zz.
+template <class Real> struct Outer {
+    Lanes<Real> entries[6]{};
+
+    Outer() = default;
+
+    RINGLET_INLINE Outer(Vec3<Real> a, Lanes<Real> w, Lanes<Real> diagonal) {
+        const Vec3<Real> wa = w * a;
+        entries[0] = wa.x * a.x + diagonal, entries[1] = wa.x * a.y, entries[2] = wa.x * a.z;
+        entries[3] = wa.y * a.y + diagonal, entries[4] = wa.y * a.z, entries[5] = wa.z * a.z + diagonal;
+    }
+
+    RINGLET_INLINE Lanes<Real> at(int row, int column) const {
+        const int low = row < column ? row : column, high = row < column ? column : row;
+        return entries[triangle(3, low) + high];
+    }
+};
+
+/// The derivatives of a joint's residuals as numbers, over the first edges of a window.
+template <class Real, int Count, int Reach>
+RINGLET_INLINE void write_rows(const Squares<Real, Count, Reach> &joint, Lanes<Real> (&rows)[Count][3 * Reach]) {
+    for (int k = 0; k < Count; ++k)
+        for (int j = 0; j < Reach; ++j) {
+            const Vec3<Real> g = joint.g[k][j];
+            rows[k][3 * j] = g.x, rows[k][3 * j + 1] = g.y, rows[k][3 * j + 2] = g.z;
+        }
+}
+
+/// Stiffness of a bend by its two edges.
+template <class Real> struct BendStiffness {
+    Lanes<Real> g[1][6]{};
+    Outer<Real> across{}; // across c, by both edges alike: + at the diagonal blocks, - beside them
+
+    BendStiffness() = default;
+
+    RINGLET_INLINE explicit BendStiffness(const Bend<Real> &bend)
+        : across(bend.c, -bend.open * reciprocal<Real>(bend.cc + Real(1e-12)), bend.open) {
+        write_rows(bend, g);
+    }
+
+    RINGLET_INLINE void add(int row, int column, Lanes<Real> &sum) const {
+        if (column >= 6) return;
+        const Lanes<Real> open = across.at(row % 3, column % 3);
+        sum += g[0][row] * g[0][column];
+        sum = row / 3 == column / 3 ? sum + open : sum - open;
+    }
+};
+
+/// Stretch of segment j, and the stiffness of its tension T, in the units of the system.
 template <class Real>
-RINGLET_INLINE void outer(Vec3<Real> a, Lanes<Real> (&block)[6], Lanes<Real> w, Lanes<Real> diagonal) {
-    block[0] = w * a.x * a.x + diagonal, block[1] = w * a.x * a.y, block[2] = w * a.x * a.z;
-    block[3] = w * a.y * a.y + diagonal, block[4] = w * a.y * a.z, block[5] = w * a.z * a.z + diagonal;
-}
-
-/// What consecutive points feel when their edges turn by the `Edges` gradients g: -g0, g0 - g1, ..., as numbers.
-template <class Real, int Edges>
-RINGLET_INLINE void point_gradient(const Vec3<Real> (&g)[Edges], Lanes<Real> (&at)[3 * Edges + 3]) {
-    Vec3<Real> before{};
-    for (int k = 0; k <= Edges; ++k) {
-        const Vec3<Real> now = k < Edges ? g[k] : Vec3<Real>{}, there = before - now;
-        at[3 * k] = there.x, at[3 * k + 1] = there.y, at[3 * k + 2] = there.z;
-        before = now;
-    }
-}
-
-/// Bending at point i: the exact rank-1 term of grad(kappa), without which tight curls blow up at 2 ms, and the
-/// transverse part.
-template <class Real, class Window>
-RINGLET_INLINE void add_bend(const Block<Real> &b, Edges<Real> &edges, int i, bool force, Lanes<Real> scale,
-                             Window &window) {
-    const Bend<Real> bend(b, edges, i);
-    if (force) add_bend_gradient(b, bend, edges, i);
-
-    const Lanes<Real> il0 = edges.il[i - 1], il1 = edges.il[i], k = scale * b.k_kappa;
-    const Vec3<Real> along_c = bend.by_c * bend.c, along_e = bend.by_e * bend.e;
-    Lanes<Real> gradient[9];
-    const Vec3<Real> turns[2] = {turning(along_e - along_c, edges.d[i - 1], il0),
-                                 turning(along_e + along_c, edges.d[i], il1)};
-    point_gradient<Real, 2>(turns, gradient);
-    window.template add_square<9>(gradient, k * b.dl[i]);
-
-    Lanes<Real> block[6], open = maximum<Real>(1 - bend.ratio, splat(Real(0)));
-    outer(bend.c, block, -open * reciprocal<Real>(dot(bend.c, bend.c) + Real(1e-12)), open);
-    const Lanes<Real> w = 4 * k * b.inverse_dl[i] * bend.inverse_ee * il0 * il1;
-    window.template add_block<0, 0>(w, block);
-    window.template add_block<0, 1>(-2 * w, block);
-    window.template add_block<0, 2>(w, block);
-    window.template add_block<1, 1>(4 * w, block);
-    window.template add_block<1, 2>(-2 * w, block);
-    window.template add_block<2, 2>(w, block);
-}
-
-/// Two unit vectors that make an orthonormal basis with d
-/// ("Building an orthonormal basis, revisited", Duff et al. 2017).
-template <class Real> RINGLET_INLINE void complete_basis(Vec3<Real> d, Vec3<Real> (&m)[2]) {
-    Lanes<Real> sign = d.z >= 0 ? splat(Real(1)) : splat(Real(-1));
-    Lanes<Real> a = -reciprocal<Real>(sign + d.z), xy = d.x * d.y * a;
-    m[0] = {1 + sign * d.x * d.x * a, sign * xy, -sign * d.x};
-    m[1] = {xy, sign + d.y * d.y * a, -d.y};
-}
-
-/// "rotor" about segment i: its energy is G/2 |r|^2 with r = sqrt(rho) R beta_i - beta_{i+1} / sqrt(rho); two rows m.r.
-template <class Real, class Window>
-RINGLET_INLINE void add_rotor(const Block<Real> &b, Edges<Real> &edges, int i, bool force, Lanes<Real> scale,
-                              Window &window) {
-    if (force) add_rotor_gradient(b, edges, i);
-    const Vec3<Real> *d = edges.d + i - 1;
-    const Lanes<Real> *il = edges.il + i - 1, inverse = b.inverse_root[i];
-    const Lanes<Real> C = b.root[i] * b.C[i], S = b.root[i] * b.S[i];
-    Vec3<Real> basis[2];
-    complete_basis(d[1], basis);
-    Lanes<Real> gradient[2][12];
-    for (int row = 0; row < 2; ++row) {
-        const Vec3<Real> m = basis[row], side = cross(d[1], m), turned = C * m - S * side; // sqrt(rho) R^T m
-        const Vec3<Real> turns[3] = {turning(cross(d[1], turned), d[0], il[0]),
-                                     turning(cross(turned, d[0]) - inverse * cross(d[2], m), d[1], il[1]),
-                                     turning(inverse * side, d[2], il[2])};
-        point_gradient<Real, 3>(turns, gradient[row]);
-    }
-    window.add_squares(gradient[0], gradient[1], scale * b.G[i]);
-}
-
-/// "rotor" at a clamped root: the window begins at point 0; the director m of segment 0 turns at a known
-/// rate [1/s].
-template <class Real, class Window>
-RINGLET_INLINE void add_root(const Block<Real> &b, Edges<Real> &edges, Vec3<Real> m, Lanes<Real> rate, bool force,
-                             Lanes<Real> scale, Window &window) {
-    const RootBend<Real> root(b, edges, m);
-    if (force) add_root_gradient(b, root, edges);
-    Lanes<Real> gradient[2][9];
-    for (int a = 0; a < 2; ++a) {
-        const Vec3<Real> turns[2] = {turning(root.by_d0[a], edges.d[0], edges.il[0]),
-                                     turning(root.by_d1[a], edges.d[1], edges.il[1])};
-        point_gradient<Real, 2>(turns, gradient[a]);
-        const Lanes<Real> known = scale * b.root_weight * root.by_theta[a] * rate;
-        for (int k = 0; k < 9; ++k) window.right[k] -= known * gradient[a][k];
-    }
-    window.add_squares(gradient[0], gradient[1], scale * b.root_weight);
-}
-
-/// "frenet" at point i: Gauss-Newton, one row of five points.
-template <class Real, class Window>
-RINGLET_INLINE void add_frenet(const Block<Real> &b, Edges<Real> &edges, int i, bool force, Lanes<Real> scale,
-                               Window &window) {
-    const FrenetTorsion<Real> torsion(b, edges, i);
-    if (force) add_frenet_gradient(b, torsion, edges, i);
-    Vec3<Real> turns[4];
-    for (int k = 0; k < 4; ++k) turns[k] = turning(torsion.by_d[k], edges.d[i - 2 + k], edges.il[i - 2 + k]);
-    Lanes<Real> gradient[15];
-    point_gradient<Real, 4>(turns, gradient);
-    window.add_square(gradient, scale * b.k_tau * b.dl[i]);
-}
-
-/// Stretch of segment j and the stiffness of its tension T.
-template <class Real, class Window>
-RINGLET_INLINE void add_stretch(const Block<Real> &b, const Edges<Real> &edges, int j, Lanes<Real> T, Lanes<Real> scale,
-                                Real dt, Window &window) {
-    Lanes<Real> block[6], tight = maximum<Real>(T, splat(Real(0))) * edges.il[j] * b.per_mass;
-    outer(edges.d[j], block, stretch_stiffness(b, T, j, dt) - tight, tight);
-    const Lanes<Real> w = scale * b.m0;
-    window.template add_block<0, 0>(w, block);
-    window.template add_block<0, 1>(-w, block);
-    window.template add_block<1, 1>(w, block);
+RINGLET_INLINE Outer<Real> stretch(const Block<Real> &b, const Edges<Real> &edges, int j, Lanes<Real> T, double dt,
+                                   double theta) {
+    const Real theta_dt = Real(theta * dt);
+    const Lanes<Real> tight = (theta_dt * theta_dt) * b.per_mass * maximum<Real>(T, splat(Real(0))) * edges.il[j];
+    return {edges.d[j], theta_dt * Real(dt) * stretch_stiffness(b, T, j, Real(dt)) - tight, tight};
 }
 
 } // namespace ringlet

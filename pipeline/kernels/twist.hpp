@@ -16,8 +16,8 @@
 
 namespace ringlet {
 
-inline constexpr double kMostTurn = 0.8;      // [rad] of a director in one step, each of predictor and Newton step
-inline constexpr double kLeastTwisting = 1e-5; // part of the stiffness that holds a director that nothing else holds
+inline constexpr double kMostTurn = 0.8;       // [rad] of a director in one step, each of predictor and Newton step
+inline constexpr double kNoStiffness = 1e-25;  // [N m] far below any hair's, for strands without
 
 /// m turned as the tangent t turns into u on the shortest way.
 template <class Real> RINGLET_INLINE Vec3<Real> transport(Vec3<Real> m, Vec3<Real> t, Vec3<Real> u) {
@@ -148,7 +148,7 @@ template <class Real> class Directors {
                 const Moments<Real> at(b, i, q);
                 const L both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1), per_length = b.inverse_dl[i];
                 const L g = Real(0.25) * maximum<Real>(turning_stiffness(b, i, q), none);
-                next_diagonal = per_length * (b.k_tau + g + Real(kLeastTwisting) * (b.k_kappa + b.k_tau));
+                next_diagonal = per_length * (b.k_tau + g + kLeastTwisting<Real> * (b.k_kappa + b.k_tau)) + Real(kNoStiffness);
                 next_coupling = per_length * (g - b.k_tau) * b.turns[j] * b.turns[i];
                 next_force = -both - at.Q;
                 diagonal += next_diagonal;
