@@ -13,6 +13,8 @@ namespace ringlet {
 
 inline constexpr int kNewtonRounds = 10, kSweepRounds = 5000;
 inline constexpr double kShrink = 0.98; // in the matrix P takes 0.98 a: an edge along n would make it singular
+/// A pivot below this part of its diagonal has no meaning: the strand is straight between two held points (bow.hpp).
+inline constexpr double kSingular = 1e-5;
 
 template <class Real> struct Lengths {
     using L = Lanes<Real>;
@@ -53,12 +55,13 @@ template <class Real> struct Lengths {
             L diagonal = il2 * il2 * (b.w[j] * (dd - Real(kShrink) * across * across) +
                                       b.w[j + 1] * (dd - Real(kShrink) * ahead * ahead));
             right[j] = Real(0.5) * (1 - dd * il2);
+            const L least = Real(kSingular) * diagonal;
             if (j > begin) {
                 L factor = coupling * inverse[j - 1];
                 diagonal -= factor * coupling;
                 right[j] -= factor * right[j - 1];
             }
-            Mask<Real> fixed = ~(b.w[j] + b.w[j + 1] > none);
+            Mask<Real> fixed = ~(diagonal > least); // 0 between two held points
             inverse[j] = select<Real>(fixed, none, 1 / diagonal);
             if (j + 1 == end) break;
             across = contacts.a[j + 1] * dot(contacts.n[j + 1], d[j + 1]);

@@ -5,6 +5,7 @@
 // beside it (test_a_strand_moves_the_same_alone_and_among_others).
 #pragma once
 
+#include "bow.hpp"
 #include "implicit.hpp"
 #include "relaxation.hpp"
 #include "twist.hpp"
@@ -118,8 +119,10 @@ template <class Real> class Stepper {
         for (int i = std::max(block.first, 1); i < block.P; ++i) {
             M moved = lanes & (block.free[i] > 0);
             to.x[i] = select(moved, to.x[i - 1] + (from.x[i] - from.x[i - 1]), to.x[i]);
-            to.v[i] = select(moved, per_second * (to.x[i] - from.x[i]), to.v[i]);
         }
+        if (block.held_inside) close_runs(block, from.x, lanes, to.x);
+        for (int i = std::max(block.first, 1); i < block.P; ++i)
+            to.v[i] = select(lanes & (block.free[i] > 0), per_second * (to.x[i] - from.x[i]), to.v[i]);
         for (int j = 0; j < block.P - 1; ++j) to.T[j] = select<Real>(lanes, from.T[j], to.T[j]);
         if (has_directors()) directors_.carry(block, from, to, lanes);
         const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
@@ -147,6 +150,10 @@ template <class Real> class Stepper {
         for (int i = block.first; i < block.P; ++i) {
             star_[i] = select(block.free[i] > 0, from.x[i] + splat(dt) * u_[i], to.x[i]);
             to.x[i] = star_[i];
+        }
+        if (block.held_inside) {
+            const M stretched = lengths_.strain(block, to.x) > Real(settings_.tolerance);
+            bow_out(block, interval.gravity, wanted & stretched, to.x);
         }
         M failed = relax(head, from, to, theta() * dt * dt, wanted);
         finish(head, from, to, dt);
