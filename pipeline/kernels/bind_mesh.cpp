@@ -57,6 +57,21 @@ static nb::ndarray<nb::numpy, float> drift_of(const MeshDistance &distance, Poin
     return array;
 }
 
+static std::tuple<nb::ndarray<nb::numpy, int32_t>, nb::ndarray<nb::numpy, float>> feet_of(const MeshDistance &distance,
+                                                                                           Points points) {
+    const std::vector<Vec> queries = vectors(points);
+    const ptrdiff_t N = ptrdiff_t(queries.size());
+    auto triangle = new_array<int32_t>({size_t(N)});
+    auto weights = new_array<float>({size_t(N), size_t(3)});
+#pragma omp parallel for num_threads(threads())
+    for (ptrdiff_t i = 0; i < N; ++i) {
+        double weight[3] = {0, 0, 0};
+        triangle.data()[i] = distance.closest(queries[i], weight);
+        for (int k = 0; k < 3; ++k) weights.data()[3 * i + k] = float(weight[k]);
+    }
+    return {triangle, weights};
+}
+
 void bind_mesh(nb::module_ &m) {
     nb::class_<MeshDistance>(m, "MeshDistance")
         .def("__init__",
@@ -66,7 +81,8 @@ void bind_mesh(nb::module_ &m) {
              },
              nb::arg("points"), nb::arg("triangles"), nb::arg("origin"), nb::arg("spacing"), nb::arg("shape"))
         .def_prop_ro("values", &values_of, nb::rv_policy::automatic)
-        .def("drift", &drift_of, nb::arg("next"));
+        .def("drift", &drift_of, nb::arg("moved"))
+        .def("feet", &feet_of, nb::arg("points"));
 }
 
 } // namespace ringlet

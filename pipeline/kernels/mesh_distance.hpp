@@ -60,6 +60,15 @@ struct Mesh {
 
     Vec corner(int triangle, int k) const { return points[triangles[triangle].corner[k]]; }
 
+    /// Barycentric weights of a point of a triangle.
+    void weights(int triangle, Vec q, double (&weight)[3]) const {
+        const Vec a = corner(triangle, 0), ab = corner(triangle, 1) - a, ac = corner(triangle, 2) - a, aq = q - a;
+        const double d00 = dot(ab, ab), d01 = dot(ab, ac), d11 = dot(ac, ac), d20 = dot(aq, ab), d21 = dot(aq, ac);
+        const double area = std::max(d00 * d11 - d01 * d01, 1e-300);
+        weight[1] = (d11 * d20 - d01 * d21) / area, weight[2] = (d00 * d21 - d01 * d20) / area;
+        weight[0] = 1 - weight[1] - weight[2];
+    }
+
     /// Fills `outwards`.
     void measure_normals() {
         struct Side {
@@ -124,20 +133,36 @@ class MeshDistance {
         for (size_t k = 0; k < count; ++k) values[k] = inside_[k] ? -values[k] : values[k];
     }
 
+    /// The triangle that is closest to a point, of those that are closest to the nodes around it, and the barycentric
+    /// weights of its foot there.
+    int closest(Vec q, double (&weight)[3]) const {
+        const double p[3] = {q.x, q.y, q.z};
+        int low[3], best = -1;
+        for (int k = 0; k < 3; ++k) low[k] = std::clamp(int((p[k] - origin[k]) / spacing), 0, n[k] - 2);
+        double nearest = std::numeric_limits<double>::infinity();
+        for (int side = 0; side < 8; ++side) {
+            const int t = owner[node(low[0] + (side & 1), low[1] + (side >> 1 & 1), low[2] + (side >> 2))];
+            const Vec at = foot_on_triangle(q, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)).at;
+            const double d = norm(q - at);
+            if (d >= nearest) continue;
+            nearest = d, best = t;
+            mesh.weights(t, at, weight);
+        }
+        return best;
+    }
+
     /// How far the mesh's points move to `next`, (3, nx, ny, nz) [m], at the foot of every node.
     void drift(const std::vector<Vec> &next, float *out, int threads) const {
         const ptrdiff_t count = ptrdiff_t(values.size());
 #pragma omp parallel for num_threads(threads)
         for (ptrdiff_t k = 0; k < count; ++k) {
-            const Triangle &t = mesh.triangles[owner[k]];
-            const Vec a = mesh.points[t.corner[0]], ab = mesh.points[t.corner[1]] - a, ac = mesh.points[t.corner[2]] - a;
-            const Vec aq = Vec{foot[3 * k], foot[3 * k + 1], foot[3 * k + 2]} - a;
-            const double d00 = dot(ab, ab), d01 = dot(ab, ac), d11 = dot(ac, ac), d20 = dot(aq, ab), d21 = dot(aq, ac);
-            const double area = std::max(d00 * d11 - d01 * d01, 1e-300);
-            const double v = (d11 * d20 - d01 * d21) / area, w = (d00 * d21 - d01 * d20) / area;
-            const Vec moved = (1 - v - w) * (next[t.corner[0]] - mesh.points[t.corner[0]]) +
-                              v * (next[t.corner[1]] - mesh.points[t.corner[1]]) +
-                              w * (next[t.corner[2]] - mesh.points[t.corner[2]]);
+            double weight[3];
+            mesh.weights(owner[k], Vec{foot[3 * k], foot[3 * k + 1], foot[3 * k + 2]}, weight);
+            Vec moved{0, 0, 0};
+            for (int corner = 0; corner < 3; ++corner) {
+                const int point = mesh.triangles[owner[k]].corner[corner];
+                moved = moved + weight[corner] * (next[point] - mesh.points[point]);
+            }
             out[k] = float(moved.x), out[count + k] = float(moved.y), out[2 * count + k] = float(moved.z);
         }
     }

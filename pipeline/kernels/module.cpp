@@ -27,6 +27,7 @@ static void set_threads(int count) {
 
 void bind_density(nb::module_ &m);
 void bind_develop(nb::module_ &m);
+void bind_drive(nb::module_ &m);
 void bind_energy(nb::module_ &m);
 void bind_mesh(nb::module_ &m);
 void bind_shade(nb::module_ &m);
@@ -44,6 +45,7 @@ NB_MODULE(RINGLET_MODULE, m) {
     m.def("threads", &ringlet::threads, "Threads that kernels use.");
     ringlet::bind_density(m);
     ringlet::bind_develop(m);
+    ringlet::bind_drive(m);
     ringlet::bind_energy(m);
     ringlet::bind_shade(m);
     ringlet::bind_expand(m);
