@@ -217,6 +217,37 @@ class DistanceField:
 def distance(field: DistanceField, points: _F64) -> tuple[_F64, _F64]:
     """Signed distance (N,) [m] and unit outward normal (N, 3) at points (N, 3) float64 [m] of the head's rest frame."""
 
+class MeshDistance:
+    """Signed distance from the nodes of a grid to a closed mesh, negative inside (mesh_distance.hpp).
+
+    Exact near the surface, an upper bound within a fraction of a cell away from it.
+    """
+
+    def __init__(
+        self,
+        points: _F64,
+        triangles: NDArray[np.int32],
+        origin: _F64,
+        spacing: float,
+        shape: tuple[int, int, int],
+    ) -> None:
+        """Points (V, 3) float64 [m], triangles (T, 3) int32 wound outwards, nodes at origin (3,) + spacing * index.
+
+        Raises:
+            ValueError: shapes or indices that do not fit, points that are not finite, a mesh outside the grid.
+
+        """
+
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """(nx, ny, nz) float32 [m]."""
+
+    def drift(self, moved: _F64) -> NDArray[np.float32]:
+        """(3, nx, ny, nz) float32 [m]: how far the foot of each node moves when the mesh's points move to `moved` (V, 3)."""
+
+    def feet(self, points: _F64) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """The triangle (N,) and the barycentric weights (N, 3) of the closest point of the mesh for points (N, 3) near it."""
+
 class StepSettings:
     """How to step. Every attribute may be assigned; defaults are those shown."""
 
@@ -235,16 +266,48 @@ class StepSettings:
 
     def __init__(self) -> None: ...
 
+class Deformation:
+    """A skin that changes from one frame to the next: the distance to it is the linear blend of both frames'."""
+
+    def __init__(self, before: DistanceField, after: NDArray[np.float32], drift: NDArray[np.float32]) -> None:
+        """The second frame.
+
+        Args:
+            before: the first frame, which is the `field` of `advance`.
+            after: (nx, ny, nz) float32 [m], distance to the second frame at the same nodes.
+            drift: (3, nx, ny, nz) float32 [m], how far the skin moves from the first to the second, at the foot of
+                each node: friction holds hair to the moving skin.
+
+        Raises:
+            ValueError: shapes that do not fit, values that are not finite.
+
+        """
+
 class Drive:
     """What moves the strands during a call of `advance`: n steps."""
 
-    def __init__(self, head: _F64, wind: _F64, hand: _F64 | None = None) -> None:
-        """Poses and wind.
+    def __init__(
+        self,
+        head: _F64,
+        wind: _F64,
+        hand: _F64 | None = None,
+        roots: _F64 | None = None,
+        deformation: Deformation | None = None,
+        blend: _F64 | None = None,
+    ) -> None:
+        """Poses, wind and skin.
 
         Args:
             head: (n+1, 4, 4) float64, head's rest frame -> world: before the first step, then after each step.
             wind: (n, 3) float64 [m/s].
             hand: (n+1, 4, 4) float64, the same for points held by the hand (`RestShape.held` = 2); unset, the head's.
+            roots: (n+1, S, 3, 4) float64, a rigid map for what the head holds of each strand, from its rest pose into
+                the head's frame; unset, the skin is rigid.
+            deformation: how the distance to the head changes; unset, it does not.
+            blend: (n+1,) float64, 0 .. 1, from the first frame of the deformation to the second.
+
+        Raises:
+            ValueError: shapes that do not fit, a deformation without blend.
 
         """
 

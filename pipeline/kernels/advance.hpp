@@ -19,12 +19,43 @@ template <class Real> struct StateArrays {
     Real *directors, *twist;
 };
 
-/// What moves the strands: `steps + 1` poses of head and hand, `steps` winds.
+/// What moves the strands: `steps + 1` poses of head and hand, `steps` winds; how the skin moves against the head.
 struct Drive {
     int steps = 0;
     std::vector<Pose> head, hand;
-    std::vector<double> wind; // (steps, 3) [m/s]
+    std::vector<double> wind;  // (steps, 3) [m/s]
+    std::vector<double> roots; // (steps + 1, S, 3, 4), or empty: the rigid map of each root in the head's frame
+    std::vector<double> blend; // (steps + 1,), or empty
+    std::shared_ptr<const Deformation> deformation;
 };
+
+/// The roots of a block's strands before or after a step.
+template <class Real> RootPose<Real> root_pose(const Drive &drive, int k, int S, const BlockIndex<Real> &index) {
+    RootPose<Real> pose;
+    Vec3<Real> columns[4] = {};
+    gather(columns, drive.roots.data() + size_t(k) * S * 12, 4, index.strand); // 12 numbers a strand, row by row
+    const Vec3<Real> *c = columns;
+    pose.row[0] = {c[0].x, c[0].y, c[0].z}, pose.row[1] = {c[1].y, c[1].z, c[2].x}, pose.row[2] = {c[2].z, c[3].x, c[3].y};
+    pose.t = {c[1].x, c[2].y, c[3].z};
+    return pose;
+}
+
+/// Step k of a drive for one block; `roots` is memory for the roots of its strands.
+template <class Real>
+Interval<Real> interval_of(const Drive &drive, int k, const StepSettings &settings, int S,
+                           const BlockIndex<Real> &index, RootPose<Real> (&roots)[2]) {
+    const Poses poses{{drive.head[k], drive.head[k + 1]}, {drive.hand[k], drive.hand[k + 1]}};
+    Interval<Real> interval{settings.dt, poses, broadcast<Real>(settings.gravity), broadcast<Real>(&drive.wind[3 * k])};
+    if (!drive.roots.empty()) {
+        for (int end = 0; end < 2; ++end) roots[end] = root_pose(drive, k + end, S, index);
+        interval.skin.roots = roots;
+    }
+    if (drive.deformation) {
+        interval.skin.deformation = drive.deformation.get();
+        for (int end = 0; end < 2; ++end) interval.skin.blend[end] = drive.blend[k + end];
+    }
+    return interval;
+}
 
 struct Report {
     double strain = 0, depth = 0, rounds = 0, contacts = 0, solves = 0;
@@ -69,11 +100,9 @@ void advance_block(Stepper<Real> &stepper, const BlockIndex<Real> &index, StateA
     read(stepper.block, rest, index);
     read(stepper.now, state, rest.P, index);
     stepper.contacts.forget(rest.P);
-    for (int k = 0; k < drive.steps; ++k) {
-        const Poses poses{{drive.head[k], drive.head[k + 1]}, {drive.hand[k], drive.hand[k + 1]}};
-        stepper.step({settings.dt, poses, broadcast<Real>(settings.gravity), broadcast<Real>(&drive.wind[3 * k])},
-                     own_lanes(index));
-    }
+    RootPose<Real> roots[2];
+    for (int k = 0; k < drive.steps; ++k)
+        stepper.step(interval_of(drive, k, settings, rest.S, index, roots), own_lanes(index));
     write(stepper.now, state, rest.P, index);
 }
 

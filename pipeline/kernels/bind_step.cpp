@@ -1,4 +1,4 @@
-// Python's view of the step: state, distance field, drive, settings, `advance` and its report.
+// Python's view of the step: state, settings, `advance` and its report.
 #include "bindings.hpp"
 
 #include "together.hpp"
@@ -19,7 +19,6 @@ namespace ringlet {
 using Doubles = nb::ndarray<nb::numpy, double>;
 using Reals = nb::ndarray<nb::numpy, nb::c_contig, nb::device::cpu>;
 using Flags = nb::ndarray<nb::numpy, uint8_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
-using Matrices = Array<const double, -1, 4, 4>;
 
 /// Python's state: it holds the caller's arrays.
 struct State {
@@ -81,53 +80,6 @@ static State at_rest(const Reals &points, const std::optional<Reals> &directors)
     return resting<double>(points, static_cast<const double *>(m));
 }
 
-static DistanceField make_field(Array<const float, -1, -1, -1> values, Array<const double, 3> origin, double spacing) {
-    DistanceField field;
-    for (int axis = 0; axis < 3; ++axis) {
-        field.n[axis] = int(values.shape(axis));
-        field.origin[axis] = origin.data()[axis];
-        require(field.n[axis] >= 2, "DistanceField: expected at least 2 nodes along each axis");
-    }
-    require(values.size() < size_t(1) << 31, "DistanceField: expected fewer than 2^31 nodes");
-    require(spacing > 0 && std::isfinite(spacing), "DistanceField: expected a positive spacing");
-    field.spacing = spacing;
-    field.values.assign(values.data(), values.data() + values.size());
-    require(std::all_of(field.values.begin(), field.values.end(), [](float v) { return std::isfinite(v); }),
-            "DistanceField: a value is not finite");
-    field.measure_slope();
-    return field;
-}
-
-static std::tuple<Doubles, Doubles> distance(const DistanceField &field, Array<const double, -1, 3> points) {
-    const int N = int(points.shape(0)), W = kLanes<double>;
-    auto values = new_array<double>({size_t(N)}), normals = new_array<double>({size_t(N), 3});
-    for (int begin = 0; begin < N; begin += W) {
-        BlockIndex<double> index(begin / W, N);
-        Vec3<double> x, gradient;
-        Lanes<double> phi;
-        gather(&x, points.data(), 1, index.strand);
-        sample<double>(field, x, phi, gradient);
-        gradient = (1 / square_root<double>(dot(gradient, gradient) + 1e-300)) * gradient;
-        scatter(&phi, values.data(), 1, index);
-        scatter(&gradient, normals.data(), 1, index);
-    }
-    return {values, normals};
-}
-
-static Drive make_drive(Matrices head, Array<const double, -1, 3> wind, std::optional<Matrices> hand) {
-    require(head.shape(0) >= 1 && head.shape(0) == wind.shape(0) + 1,
-            "Drive: expected head (n+1, 4, 4) and wind (n, 3)");
-    require(!hand || hand->shape(0) == head.shape(0), "Drive: expected hand (n+1, 4, 4)");
-    Drive drive;
-    drive.steps = int(wind.shape(0));
-    drive.wind.assign(wind.data(), wind.data() + wind.size());
-    for (size_t k = 0; k < head.shape(0); ++k) {
-        drive.head.push_back(Pose::of(head.data() + 16 * k));
-        drive.hand.push_back(Pose::of((hand ? hand->data() : head.data()) + 16 * k));
-    }
-    return drive;
-}
-
 static void check_settings(const StepSettings &s) {
     require(s.dt > 0 && std::isfinite(s.dt), "settings: dt must be positive");
     require(s.theta >= 0.5 && s.theta <= 1, "settings: theta must be from 0.5 to 1");
@@ -139,6 +91,13 @@ static void check_settings(const StepSettings &s) {
 static void check_fits(const State &state, const RestShape &rest) {
     require(int(state.S()) == rest.S && int(state.P()) == rest.P,
             "state and rest shape have different numbers of strands or points");
+}
+
+static void check_drive(const Drive &drive, const RestShape &rest, const DistanceField *field) {
+    require(drive.roots.empty() || drive.roots.size() == (size_t(drive.steps) + 1) * rest.S * 12,
+            "Drive: roots are for another number of strands");
+    require(!drive.deformation || (field && field->values.size() == drive.deformation->after.values.size()),
+            "Drive: a deformation needs the field that it begins with");
 }
 
 template <class Real>
@@ -153,6 +112,7 @@ static Report advance_state(State &state, const RestShape &rest, const DistanceF
                             const StepSettings &settings, const Neighbours *neighbours) {
     check_fits(state, rest);
     check_settings(settings);
+    check_drive(drive, rest, field);
     require(!neighbours || neighbours->fits(rest.S, rest.P), "neighbours: made for another rest shape");
     nb::gil_scoped_release release;
     double seconds = 0;
@@ -321,14 +281,6 @@ static void bind_values(nb::module_ &m) {
         .def_prop_ro("contact", [](State &state) { return state.contact; }, nb::rv_policy::automatic)
         .def_prop_ro("directors", [](State &state) { return state.directors; }, nb::rv_policy::automatic)
         .def_prop_ro("twist", [](State &state) { return state.twist; }, nb::rv_policy::automatic);
-    nb::class_<DistanceField>(m, "DistanceField")
-        .def("__init__", [](DistanceField *self, Array<const float, -1, -1, -1> values, Array<const double, 3> origin,
-                            double spacing) { new (self) DistanceField(make_field(values, origin, spacing)); },
-             nb::arg("values"), nb::arg("origin"), nb::arg("spacing"));
-    nb::class_<Drive>(m, "Drive")
-        .def("__init__", [](Drive *self, Matrices head, Array<const double, -1, 3> wind, std::optional<Matrices> hand) {
-            new (self) Drive(make_drive(head, wind, hand));
-        }, nb::arg("head"), nb::arg("wind"), nb::arg("hand") = nb::none());
     nb::class_<Report>(m, "Report")
         .def_ro("strain", &Report::strain)
         .def_ro("depth", &Report::depth)
@@ -346,7 +298,6 @@ void bind_step(nb::module_ &m) {
     bind_values(m);
     bind_settings(m);
     m.def("at_rest", &at_rest, nb::arg("points"), nb::arg("directors") = nb::none());
-    m.def("distance", &distance, nb::arg("field"), nb::arg("points"));
     m.def("advance", &advance_state, nb::arg("state"), nb::arg("rest"), nb::arg("field").none(), nb::arg("drive"),
           nb::arg("settings"), nb::arg("neighbours") = nb::none());
     m.def("neighbour_acceleration", &neighbour_acceleration_of, nb::arg("state"), nb::arg("rest"),

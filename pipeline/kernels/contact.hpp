@@ -11,7 +11,7 @@
 #include "block.hpp"
 #include "distance_field.hpp"
 #include "path.hpp"
-#include "pose.hpp"
+#include "settings.hpp"
 
 namespace ringlet {
 
@@ -22,17 +22,34 @@ inline constexpr double kPull = 0.01;       // [m/s^2] a row that pulls more tha
 inline constexpr double kDepth = 0.05e-3;   // [m] depth below the offset that is let pass
 inline constexpr double kWay = 0.7;         // [cells] a shorter way in a step cannot lead through what cells resolve
 
-/// The head during one step.
+/// The head during one step or a part of one.
 template <class Real> struct HeadStep {
+    using L = Lanes<Real>;
     const DistanceField *field; // null for no head
+    Pose before, after;
     Rigid<Real> was, local;     // world -> rest frame, at the old pose and at the new one
     Rigid<Real> turn;           // rest frame -> world at the new pose
     Rigid<Real> carry;          // world -> world: what moves with the head from the old pose to the new one
-    Pose before, after;
+    const Deformation *deformation; // null for a rigid skin
+    Real blend, drift;              // at the end; how much of the drift this step takes
+    double steepest;                // bound of the slope
 
-    HeadStep(const DistanceField *field, const Pose &before, const Pose &after)
-        : field(field), was(before.inverse()), local(after.inverse()), turn(after), carry(after * before.inverse()),
-          before(before), after(after) {}
+    HeadStep(const DistanceField *field, const Interval<Real> &interval)
+        : field(field), before(interval.poses.head[0]), after(interval.poses.head[1]), was(before.inverse()),
+          local(after.inverse()), turn(after), carry(after * before.inverse()), deformation(interval.skin.deformation),
+          blend(Real(interval.skin.blend_at(1))),
+          drift(Real(interval.skin.blend_at(1) - interval.skin.blend_at(0))), steepest(field ? field->steepest : 1) {
+        if (deformation) steepest = std::max(steepest, deformation->after.steepest);
+    }
+
+    /// Distance and its gradient (not normalised) at points of the rest frame, at the end of the step.
+    RINGLET_INLINE void measure(Vec3<Real> at, L &phi, Vec3<Real> &gradient) const {
+        sample<Real>(*field, at, phi, gradient);
+        if (deformation) measure_deformed(at, phi, gradient);
+    }
+
+    /// Where points that touch the skin would be if they had moved with it during the step.
+    RINGLET_INLINE Vec3<Real> carried(Vec3<Real> old) const { return deformation ? carried_deformed(old) : carry(old); }
 
     /// Where a point that moves straight through the world is at half time, seen from the head: from its places in the
     /// rest frame at the beginning and at the end.
@@ -42,7 +59,22 @@ template <class Real> struct HeadStep {
     }
 
   private:
-    using L = Lanes<Real>;
+    __attribute__((noinline)) void measure_deformed(Vec3<Real> at, L &phi, Vec3<Real> &gradient) const {
+        L next;
+        Vec3<Real> slope;
+        sample<Real>(deformation->after, at, next, slope);
+        const L w = splat(blend);
+        phi += w * (next - phi);
+        gradient = gradient + w * (slope - gradient);
+    }
+
+    __attribute__((noinline)) Vec3<Real> carried_deformed(Vec3<Real> old) const {
+        const Vec3<Real> at = was(old);
+        L moved[3];
+        Vec3<Real> slope;
+        for (int k = 0; k < 3; ++k) sample<Real>(deformation->drift[k], at, moved[k], slope);
+        return turn(at + splat(drift) * Vec3<Real>{moved[0], moved[1], moved[2]});
+    }
 };
 
 template <class Real> struct Contacts {
@@ -65,21 +97,26 @@ template <class Real> struct Contacts {
         for (int i = 0; i < P; ++i) phi[i] = splat(Real(-1e3)), nearby[i] = Vec3<Real>{};
     }
 
+    /// The skin may have come nearer by so much [m] since the samples.
+    void age(int P, Real nearer) {
+        for (int i = 0; i < P; ++i) phi[i] -= nearer;
+    }
+
     /// Samples the field at point i; false when no lane can be within `reach` of the surface, or has passed it in this
     /// step. A sample is spared when the last one and the steepest slope of the field prove as much.
     RINGLET_INLINE bool near(const HeadStep<Real> &head, int i, Vec3<Real> x, L reach, L &distance,
                              Vec3<Real> &normal) {
         const Vec3<Real> at = head.local(x), moved = at - nearby[i], begun = start[i] - nearby[i];
         L square = maximum<Real>(dot(moved, moved), dot(begun, begun)); // a ball that holds both ends holds the way
-        L bound = phi[i] - Real(head.field->steepest) * square_root<Real>(square);
+        L bound = phi[i] - Real(head.steepest) * square_root<Real>(square);
         if (!any<Real>(~(bound > reach))) return false;
-        sample<Real>(*head.field, at, distance, normal);
+        head.measure(at, distance, normal);
         nearby[i] = at, phi[i] = distance;
         const Vec3<Real> way = at - start[i];
         const Real far = Real(kWay * head.field->spacing);
         if (any<Real>(dot(way, way) > far * far)) {
             const Vec3<Real> between = head.between(start[i], at);
-            follow<Real>(*head.field, Way<Real>(start[i], between, at), dot(way, way) > far * far, distance, normal);
+            follow<Real>(head, Way<Real>(start[i], between, at), dot(way, way) > far * far, distance, normal);
         }
         if (!any<Real>(distance < reach)) return false;
         L steepness = square_root<Real>(dot(normal, normal) + Real(1e-20));
@@ -90,6 +127,7 @@ template <class Real> struct Contacts {
     /// Step a: which points get a row, from their predicted positions.
     void find_rows(const Block<Real> &b, const HeadStep<Real> &head, const Motion<Real> &from, Real dt) {
         any_row = false;
+        if (head.deformation) age(b.P, Real(std::abs(head.drift) * head.deformation->fastest));
         for (int i = 0; i < b.P; ++i) {
             row[i] = none, a[i] = none, s[i] = none, fresh[i] = none, stuck[i] = none, N[i] = none;
             if (!head.field || i < b.first) continue;
@@ -173,7 +211,7 @@ template <class Real> struct Contacts {
                             Motion<Real> &to) {
         L budget = select<Real>(here, friction * (depth + fresh[i]), none);
         fresh[i] = select<Real>(here, none, fresh[i]);
-        Vec3<Real> moved = to.x[i] - head.carry(old), slid = moved - dot(moved, n[i]) * n[i];
+        Vec3<Real> moved = to.x[i] - head.carried(old), slid = moved - dot(moved, n[i]) * n[i];
         L length = square_root<Real>(dot(slid, slid) + Real(1e-30));
         Mask<Real> holds = (budget >= length) & (budget > none);
         L part = select<Real>(holds, one, budget / length);
@@ -187,7 +225,7 @@ template <class Real> struct Contacts {
         Mask<Real> on = (a[i] > none) | (row[i] > none);
         if (!any<Real>(on)) return v_free;
         const L per_second = splat(1 / dt);
-        Vec3<Real> carried = head.carry(old), v_head = per_second * (carried - old);
+        Vec3<Real> carried = head.carried(old), v_head = per_second * (carried - old);
         Vec3<Real> moved = now - carried, slid = moved - dot(moved, n[i]) * n[i];
         Vec3<Real> relative = v_free - v_head, sliding = relative - dot(relative, n[i]) * n[i];
         Vec3<Real> along = select(stuck[i] > none, per_second * slid, sliding);

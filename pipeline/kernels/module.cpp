@@ -27,7 +27,9 @@ static void set_threads(int count) {
 
 void bind_density(nb::module_ &m);
 void bind_develop(nb::module_ &m);
+void bind_drive(nb::module_ &m);
 void bind_energy(nb::module_ &m);
+void bind_mesh(nb::module_ &m);
 void bind_shade(nb::module_ &m);
 void bind_expand(nb::module_ &m);
 void bind_statics(nb::module_ &m);
@@ -43,9 +45,11 @@ NB_MODULE(RINGLET_MODULE, m) {
     m.def("threads", &ringlet::threads, "Threads that kernels use.");
     ringlet::bind_density(m);
     ringlet::bind_develop(m);
+    ringlet::bind_drive(m);
     ringlet::bind_energy(m);
     ringlet::bind_shade(m);
     ringlet::bind_expand(m);
+    ringlet::bind_mesh(m);
     ringlet::bind_statics(m);
     ringlet::bind_neighbours(m);
     ringlet::bind_step(m);

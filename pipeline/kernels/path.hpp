@@ -30,11 +30,12 @@ template <class Real> struct Way {
 
 /// Lanes that have come through the head, or beyond its middle, take the plane on which they went in: its distance and
 /// its gradient instead of those at the way's end. Lanes that begin inside keep what they have.
-template <class Real>
-__attribute__((noinline)) void follow(const DistanceField &field, const Way<Real> &way, Mask<Real> far,
-                                      Lanes<Real> &distance, Vec3<Real> &gradient) {
+/// `head` measures the distance at the end of the step.
+template <class Real, class Head>
+__attribute__((noinline)) void follow(const Head &head, const Way<Real> &way, Mask<Real> far, Lanes<Real> &distance,
+                                      Vec3<Real> &gradient) {
     const Lanes<Real> none = splat(Real(0)), per_way = 1 / way.longest;
-    const Lanes<Real> least = maximum<Real>(splat(Real(0.5 * field.spacing)), way.longest * Real(1.0 / kWaySteps));
+    const Lanes<Real> least = maximum<Real>(splat(Real(0.5 * head.field->spacing)), way.longest * Real(1.0 / kWaySteps));
     const Vec3<Real> end = way.end();
     Lanes<Real> u = none, plane = none;
     Vec3<Real> outwards{none, none, none};
@@ -43,7 +44,7 @@ __attribute__((noinline)) void follow(const DistanceField &field, const Way<Real
         Lanes<Real> phi;
         Vec3<Real> slope;
         const Vec3<Real> here = way.at(u);
-        sample<Real>(field, here, phi, slope);
+        head.measure(here, phi, slope);
         const Mask<Real> outside = open & (phi >= none);
         begun_outside |= outside;
         slope = (1 / square_root<Real>(dot(slope, slope) + Real(1e-20))) * slope;
@@ -51,7 +52,7 @@ __attribute__((noinline)) void follow(const DistanceField &field, const Way<Real
         outwards = select(outside, slope, outwards);
         entered |= open & begun_outside & ~outside;
         open = outside;
-        u += maximum<Real>(phi * Real(1 / field.steepest), least) * per_way;
+        u += maximum<Real>(phi * Real(1 / head.steepest), least) * per_way;
         open &= u < Real(1);
     }
     const Mask<Real> through = entered & (plane < distance) & ((distance >= none) | (dot(outwards, gradient) < none));

@@ -1,6 +1,7 @@
 // How to step, and what moves the strands during one step.
 #pragma once
 
+#include "deformation.hpp"
 #include "pose.hpp"
 
 namespace ringlet {
@@ -40,9 +41,10 @@ template <class Real> struct Interval {
     double dt;
     Poses poses;
     Vec3<Real> gravity, wind;
+    SkinStep<Real> skin = {};
 
     Interval halved(bool second) const {
-        return {0.5 * dt, second ? poses.second_half() : poses.first_half(), gravity, wind};
+        return {0.5 * dt, second ? poses.second_half() : poses.first_half(), gravity, wind, skin.halved(second)};
     }
 };
 

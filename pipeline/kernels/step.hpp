@@ -125,7 +125,7 @@ template <class Real> class Stepper {
             to.v[i] = select(lanes & (block.free[i] > 0), per_second * (to.x[i] - from.x[i]), to.v[i]);
         for (int j = 0; j < block.P - 1; ++j) to.T[j] = select<Real>(lanes, from.T[j], to.T[j]);
         if (has_directors()) directors_.carry(block, from, to, lanes);
-        const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
+        const HeadStep<Real> head(field_, interval);
         tally.strain = maximum<Real>(tally.strain, select<Real>(lanes, lengths_.strain(block, to.x), L{}));
         tally.depth = maximum<Real>(tally.depth, select<Real>(lanes, contacts.depth(block, head, to.x), L{}));
     }
@@ -140,7 +140,7 @@ template <class Real> class Stepper {
     /// The whole step from one motion to another; the lanes in which lengths and contacts did not converge.
     M attempt(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to, M wanted) {
         const Real dt = Real(interval.dt);
-        const HeadStep<Real> head(field_, interval.poses.head[0], interval.poses.head[1]);
+        const HeadStep<Real> head(field_, interval);
         move_held(interval, from, to);
         edges_.follow(from.x, block.P);
         hold_directors(interval, from, to);
@@ -169,15 +169,14 @@ template <class Real> class Stepper {
         const L per_second = splat(Real(1) / Real(interval.dt));
         for (int i = 0; i < block.P; ++i) {
             if (i >= block.first && !block.held_inside) break;
-            to.x[i] = select(block.hand[i] > 0, hand(block.anchor[i]), head(block.anchor[i]));
+            to.x[i] = select(block.hand[i] > 0, hand(block.anchor[i]), head(interval.skin.place(block.anchor[i])));
             u_[i] = per_second * (to.x[i] - from.x[i]);
         }
     }
 
     /// Held directors go with the head or the hand; of the others only "kirchhoff" takes care.
     void hold_directors(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
-        const Rigid<Real> ends[2] = {interval.poses.head[1], interval.poses.hand[1]};
-        directors_.hold(block, edges_, ends, Real(interval.dt), from, to);
+        directors_.hold(block, edges_, interval, from, to);
         if (!has_directors()) std::copy_n(from.twist, block.P, to.twist);
     }
 

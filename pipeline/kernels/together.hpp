@@ -89,9 +89,7 @@ template <class Real> class Together {
     }
 
     void step_blocks(Stepper<Real> &stepper, NeighbourForce<Real> &force, int k, double &acting) {
-        const Poses poses{{drive_.head[k], drive_.head[k + 1]}, {drive_.hand[k], drive_.hand[k + 1]}};
-        const Interval<Real> interval{settings_.dt, poses, broadcast<Real>(settings_.gravity),
-                                      broadcast<Real>(&drive_.wind[3 * k])};
+        RootPose<Real> roots[2];
 #pragma omp for schedule(dynamic, 1)
         for (int b = 0; b < int(blocks_.size()); ++b) {
             Resident<Real> &resident = blocks_[b];
@@ -102,7 +100,7 @@ template <class Real> class Together {
             stepper.outside = &resident.outside;
             stepper.tally = tallies_[b];
             stepper.exchange(resident);
-            stepper.step(interval, own_lanes(resident.index));
+            stepper.step(interval_of(drive_, k, settings_, rest_.S, resident.index, roots), own_lanes(resident.index));
             stepper.exchange(resident);
             tallies_[b] = stepper.tally;
             const Clock clock(acting);

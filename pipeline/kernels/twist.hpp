@@ -12,7 +12,7 @@
 #pragma once
 
 #include "kirchhoff.hpp"
-#include "pose.hpp"
+#include "settings.hpp"
 
 namespace ringlet {
 
@@ -92,15 +92,16 @@ template <class Real> class Directors {
 
     /// A director is held where both ends of its segment are, and goes rigidly with them: the directors of held
     /// segments at the end of the step, and their spin. `edges` are those before the step.
-    void hold(const Block<Real> &b, const Edges<Real> &edges, const Rigid<Real> (&head_and_hand)[2], Real dt,
-              const Motion<Real> &from, Motion<Real> &to) {
+    void hold(const Block<Real> &b, const Edges<Real> &edges, const Interval<Real> &interval, const Motion<Real> &from,
+              Motion<Real> &to) {
+        const Rigid<Real> head(interval.poses.head[1]), hand(interval.poses.hand[1]);
+        const Real dt = Real(interval.dt);
         for (int j = 0; j < b.P - 1; ++j) {
             spin[j] = L{};
             to.m[j] = from.m[j];
             if (!any<Real>(b.turns[j] < 1)) continue;
             const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = inverse_root<Real>(dot(edge, edge)) * edge;
-            const Vec3<Real> by_head = head_and_hand[0].turn(b.director[j]);
-            const Vec3<Real> by_hand = head_and_hand[1].turn(b.director[j]);
+            const Vec3<Real> by_head = head.turn(interval.skin.turn(b.director[j])), by_hand = hand.turn(b.director[j]);
             const Vec3<Real> m = squared(select(b.hand[j] > 0, by_hand, by_head), t);
             const Vec3<Real> before = squared(transport(from.m[j], edges.d[j], t), t);
             const HalfAngle<Real> half(dot(before, m), dot(cross(before, m), t));
