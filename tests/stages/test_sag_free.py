@@ -21,6 +21,7 @@ from pipeline.simulate.screws import rotation_matrix
 from pipeline.simulate.stepper import Guides, Simulation
 from pipeline.strands.held import held_ends
 from pipeline.strands.strands import Strands
+from tests.conftest import helix
 
 REPOSITORY = Path(__file__).parents[2]
 SHAKE = Motion(preset="shake", amplitude=np.pi / 3, period=0.5, swings=2, pivot=(0.0, 0.0, 0.0))
@@ -48,20 +49,13 @@ def on_head(points: NDArray[np.floating], head: Head) -> Guides:
     return guides_of(x, contact_offset(Config(name="test"), head, x), head)
 
 
-def curled(radius: float, pitch: float, length: float) -> NDArray[np.float64]:
-    """A helix about x."""
-    rise = pitch / (2 * np.pi)
-    angle = np.linspace(0, length, 32) / np.hypot(radius, rise)
-    return np.stack([rise * angle, radius * np.cos(angle) - radius, radius * np.sin(angle)], axis=-1)
-
-
 def free_grooms(name: str) -> Guides:
     """Strands without a head, in nine directions."""
     strand = {
-        "straight": curled(0.0, 0.1, 0.2),
-        "wavy": curled(0.01, 0.065, 0.2),
-        "curly": curled(0.005, 0.03, 0.2),
-        "tight": curled(0.0025, 0.012, 0.15),
+        "straight": helix(0.0, 0.1, 0.2, 32),
+        "wavy": helix(0.01, 0.065, 0.2, 32),
+        "curly": helix(0.005, 0.03, 0.2, 32),
+        "tight": helix(0.0025, 0.012, 0.15, 32),
     }[name]
     tilts = np.linspace(-1.5, 1.5, 9)
     return guides_of(np.array([strand @ rotation_matrix(np.array([0, 2 * a, a])).T for a in tilts]))
