@@ -127,8 +127,8 @@ class Simulate(Section):
     """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond."""
     torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "rotor"
     """Torsion model: "kirchhoff" (material frames), "rotor" (4-point), "frenet" (the lecture's, regularised) or "none"."""
-    rest: Literal["groom", "sag_free"] = "groom"
-    """Rest shape: the "groom" itself, which then sags under gravity, or "sag_free", one that holds the groom (torsion "kirchhoff")."""
+    rest: Literal["auto", "groom", "sag_free"] = "groom"
+    """Rest shape: the "groom" itself, which then sags under gravity; "sag_free", one that holds the groom (torsion "kirchhoff"); or "auto", sag-free where that can be."""
     sag_free: SagFree = SagFree()
     """How stable a sag-free groom is made."""
     relaxation: Literal["newton", "sweep"] = "newton"
@@ -174,5 +174,7 @@ class Simulate(Section):
     def _torsion_holds_it(cls, rest: str, info: ValidationInfo) -> str:
         torsion = info.data.get("torsion", "kirchhoff")
         if rest == "sag_free" and torsion != "kirchhoff":
-            raise ValueError(f'"sag_free" needs simulate.torsion = "kirchhoff": {_CANNOT_HOLD[torsion]}')
+            raise ValueError(
+                f'"sag_free" needs simulate.torsion = "kirchhoff": {_CANNOT_HOLD[torsion]}; or take "auto"'
+            )
         return rest
