@@ -433,7 +433,8 @@ def sag_free(
     (stability.hpp), and is given `margin` times that where this is more than 1.
 
     Args:
-        rest: clamped strands: at least two points held at the root, none beyond; nothing is written to it.
+        rest: nothing is written to it. Whatever holds points beyond the root takes any force and couple, chosen so that
+            rest strains change least. Strands without two held points at the root keep the groom as their rest shape.
         load: (S, P, 3) float64 [N], forces on the points in the head's rest frame, weight included.
         normal: (S, P, 3) float64, unit normal of the head where it can support a point, 0 elsewhere.
         margin: at least 1.
@@ -441,7 +442,7 @@ def sag_free(
         lean_above: at least 1; strands that need more than this lean on the head, where that halves what they need.
 
     Raises:
-        ValueError: shapes that do not fit, strands without stiffness, strands that are not clamped at the root alone.
+        ValueError: shapes that do not fit, or strands without stiffness.
 
     """
 

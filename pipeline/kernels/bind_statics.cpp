@@ -8,18 +8,6 @@ namespace ringlet {
 using Doubles = nb::ndarray<nb::numpy, double>;
 using Vectors = Array<const double, -1, -1, 3>;
 
-/// Which strands the statics can solve: clamped at the root, free elsewhere.
-static void check_held(const RestShape &rest) {
-    for (int s = 0; s < rest.S; ++s) {
-        const uint8_t *held = &rest.held[size_t(s) * rest.P];
-        int root = 0;
-        while (root < rest.P && held[root]) ++root;
-        require(root >= 2, "sag_free: a strand is not clamped: hold two points at its root");
-        for (int i = root; i < rest.P; ++i)
-            require(!held[i], "sag_free: a strand is held beyond its root: its forces do not follow from its shape");
-    }
-}
-
 static SagFree solve(const RestShape &rest, Vectors load, Vectors normal, double margin, double max_factor,
                      double lean_above) {
     const size_t S = size_t(rest.S), P = size_t(rest.P);
@@ -33,7 +21,6 @@ static SagFree solve(const RestShape &rest, Vectors load, Vectors normal, double
     };
     require(positive(rest.bending) && positive(rest.bending_2) && positive(rest.twisting),
             "sag_free: bending and twisting must be positive");
-    check_held(rest);
     nb::gil_scoped_release release;
     return sag_free({rest, load.data(), normal.data(), margin, max_factor, lean_above}, threads());
 }

@@ -42,14 +42,18 @@ class SagFreeBlock {
   public:
     SagFreeBlock(Arena &arena, int P)
         : block_(arena, P), stability_(arena, P), normal_(arena.take<Vector>(P)), gravity_(arena.take<Vector>(P)),
-          strain_(arena.take<Vector>(P)), reaction_(arena.take<Many>(P)), tension_(arena.take<Many>(P)) {}
+          strain_(arena.take<Vector>(P)), reaction_(arena.take<Many>(P)), tension_(arena.take<Many>(P)) {
+        for (auto **array : {&force_[0], &force_[1], &couple_[0], &couple_[1]}) *array = arena.take<Vector>(P);
+    }
 
-    static size_t bytes(int P) { return sizeof(Many) * (size_t(P) * (90 + sizeof(StaticJoint) / sizeof(Many)) + 512); }
+    static size_t bytes(int P) { return sizeof(Many) * (size_t(P) * (112 + sizeof(StaticJoint) / sizeof(Many)) + 512); }
 
     void solve(const Groom &groom, const BlockIndex<double> &index, SagFree &result) {
         const int P = block_.P;
         read(groom, index);
         block_.set_joints();
+        load();
+        hold(index);
         Many critical, needed;
         balance(groom.margin, critical, needed);
         lean(groom, index, critical, needed);
@@ -74,6 +78,7 @@ class SagFreeBlock {
     StaticBlock block_;
     Stability stability_;
     Vector *normal_, *gravity_, *strain_;
+    Vector *force_[2], *couple_[2]; // of what holds strands beyond their roots; what leaning adds
     Many *reaction_, *tension_;
 
     void read(const Groom &groom, const BlockIndex<double> &index) {
@@ -87,13 +92,25 @@ class SagFreeBlock {
         gather<double>(&block_.B[1], groom.rest.bending_2.data(), 1, 1, index.strand);
         gather<double>(&block_.B[2], groom.rest.twisting.data(), 1, 1, index.strand);
         for (int i = 0; i < P; ++i) {
-            block_.F[i] = gravity_[i], stability_.n[i] = Vector{}, reaction_[i] = Many{};
-            if (i == P - 1) break;
+            reaction_[i] = Many{};
+            for (int k = 0; k < 2; ++k) force_[k][i] = couple_[k][i] = Vector{};
             for (int lane = 0; lane < kLanes<double>; ++lane) {
-                const uint8_t *held = &groom.rest.held[size_t(index.strand[lane]) * P + i];
-                block_.turns[i][lane] = held[0] == 0 || held[1] == 0;
+                const uint8_t *held = &groom.rest.held[size_t(index.strand[lane]) * P];
+                const bool clamped = held[0] && held[1];
+                block_.held[i][lane] = held[i] != 0;
+                if (i + 1 < P) block_.turns[i][lane] = clamped && !(held[i] && held[i + 1]);
             }
         }
+    }
+
+    /// Forces and couples of what holds strands beyond their roots; they bear the loads of held points themselves.
+    void hold(const BlockIndex<double> &index) {
+        block_.balance();
+        for (int lane = 0; lane < index.count; ++lane) {
+            const Reactions reactions(block_, lane);
+            if (reactions.count() > 0) reactions.solve(reaction_, force_[0], couple_[0]);
+        }
+        load();
     }
 
     /// Balances the loads; the critical factor, and the one that is needed.
@@ -110,9 +127,12 @@ class SagFreeBlock {
         bool leans = false;
         for (int lane = 0; lane < index.count; ++lane) {
             if (!(needed[lane] > groom.lean_above)) continue;
-            const Reactions reactions(block_, normal_, lane);
-            leans = leans || reactions.count() > 0;
-            reactions.solve(reaction_);
+            Reactions reactions(block_, lane);
+            const int held = reactions.count();
+            reactions.lean(normal_);
+            if (reactions.count() == held) continue;
+            reactions.solve(reaction_, force_[1], couple_[1]);
+            leans = true;
         }
         if (!leans) return;
         load();
@@ -121,16 +141,23 @@ class SagFreeBlock {
         const Mask<double> helps = leaning_needed < kWorthLeaning * needed;
         critical = select<double>(helps, leaning_critical, critical);
         needed = select<double>(helps, leaning_needed, needed);
-        for (int k = 0; k < block_.P; ++k) reaction_[k] = select<double>(helps, reaction_[k], Many{});
+        for (int k = 0; k < block_.P; ++k) {
+            reaction_[k] = select<double>(helps, reaction_[k], Many{});
+            force_[1][k] = select(helps, force_[1][k], Vector{});
+            couple_[1][k] = select(helps, couple_[1][k], Vector{});
+        }
         load();
         block_.balance();
     }
 
-    /// Gravity and reactions; the head holds the points that have some.
+    /// Puts all forces and couples together, and what they hold.
     void load() {
+        const Many one = splat(1.0);
         for (int k = 0; k < block_.P; ++k) {
-            block_.F[k] = gravity_[k] + reaction_[k] * normal_[k];
-            stability_.n[k] = select(reaction_[k] > splat(0.0), normal_[k], Vector{});
+            const Many held = block_.held[k], leans = select<double>(reaction_[k] > splat(0.0), one, Many{});
+            block_.F[k] = (1 - held) * gravity_[k] + force_[0][k] + force_[1][k];
+            block_.couple[k] = couple_[0][k] + couple_[1][k];
+            stability_.hold[k] = diagonal<double>(held) + leans * outer(normal_[k], normal_[k]);
         }
     }
 };

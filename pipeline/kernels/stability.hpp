@@ -8,7 +8,7 @@
 //     segment j: l ((t.W) I - (t W^T + W t^T) / 2) on (j, j)
 //     K = sum_a B_a f / dl g_a g_a^T + sym(v_1 g_1^T + v_2 g_2^T + v_3 g_3^T)
 // with v_a the change of tau, at fixed s, by k_1, k_2 and by half the twist. Points that the head carries are held to
-// its surface by a stiff spring rho n n^T, which couples all segments below the point; eliminated from tip to root as
+// its surface by a stiff spring rho n n^T, held points beyond the root by rho I; that couples all segments below the point; eliminated from tip to root as
 // a chain with the state (omega_j, dx_{j+1}) this still costs a fixed amount a segment (a Riccati recursion): the
 // matrix is positive definite iff all 3x3 pivots are.
 // test_second_variation_agrees_with_differences, test_upright_strand_buckles_at_greenhills_length prove it.
@@ -25,13 +25,13 @@ inline constexpr double kSpring = 1e3;                          // rho, in max(B
 struct Stability {
     int P;
     Matrix *elastic, *stressed, *loaded; // K of joint i: per factor, and the rest; segment j's block
-    Vector *tau, *n;                     // of joint i; normal that point i is held along, 0 for none
+    Vector *tau;                         // of joint i
+    Matrix *hold;                        // of point i: n n^T where it can only move along the head, I where it is held
     Many rho;
     const StaticBlock *block = nullptr;
 
-    Stability(Arena &arena, int points) : P(points) {
-        for (auto **array : {&elastic, &stressed, &loaded}) *array = arena.take<Matrix>(P);
-        for (auto **array : {&tau, &n}) *array = arena.take<Vector>(P);
+    Stability(Arena &arena, int points) : P(points), tau(arena.take<Vector>(points)) {
+        for (auto **array : {&elastic, &stressed, &loaded, &hold}) *array = arena.take<Matrix>(P);
     }
 
     /// The blocks of the second variation at the balance of a block.
@@ -52,21 +52,21 @@ struct Stability {
     /// Lanes in which f H0 + Hg is positive definite.
     Mask<double> stable(Many f) const {
         Mask<double> positive = splat(0.0) < splat(1.0);
-        Matrix ww{}, wx{}, xx = f * rho * outer(n[P - 1], n[P - 1]); // of (omega_j, dx_{j+1}): all beyond segment j
+        Matrix ww{}, wx{}, xx = f * rho * hold[P - 1]; // of (omega_j, dx_{j+1}): all beyond segment j
         for (int j = P - 2; j >= 1; --j) {
             const Many turns = block->turns[j], fixed = 1 - turns;
-            const Matrix K = turns * (f * elastic[j] + stressed[j]), arm = (-turns * block->l[j]) * crossing(block->t[j]);
+            const Matrix K = block->joint[j].live * (f * elastic[j] + stressed[j]), arm = (-turns * block->l[j]) * crossing(block->t[j]);
             // dx_{j+1} = dx_j + arm omega_j
             const Matrix pulled = xx * arm, swung = wx * arm;
             const Matrix pivot = ww + K + turns * loaded[j] + transposed(arm) * pulled + swung + transposed(swung) +
                                  diagonal<double>(fixed);
             const Factored3<double> factored(pivot);
             positive &= factored.positive | (turns == splat(0.0));
-            const Matrix N = (0.5 * turns) * crossing(tau[j]) - K, C = wx + transposed(pulled);
+            const Matrix N = turns * (splat(0.5) * crossing(tau[j]) - K), C = wx + transposed(pulled);
             const Matrix X = factored.solve(transposed(N)), Y = turns * factored.solve(C);
             ww = K - N * X;
             wx = splat(-1.0) * (N * Y);
-            xx = xx - transposed(C) * Y + f * rho * outer(n[j], n[j]);
+            xx = xx - transposed(C) * Y + f * rho * hold[j];
         }
         return positive;
     }

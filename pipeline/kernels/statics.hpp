@@ -4,7 +4,7 @@
 // Source: discrete rods with material frames (Bergou et al., Discrete Elastic Rods, 2008). For an inextensible rod
 // whose root is clamped the forces follow from the loads alone, and each joint has one 3x3 system, exactly solvable:
 //     W_j = sum of the loads F_k over the points k > j          force through segment j; tension T_j = t_j . W_j
-//     M_i = sum_{j >= i} e_j x W_j                              moment at joint i
+//     M_i = sum_{j >= i} e_j x W_j + C_j                        moment at joint i; C_j couples on held segments
 //     [g_1 g_2 g_3] s = M_i,  u_r = u - dl s / (B f)            B = (B1, B2, C), f a factor on the stiffness
 // Notation: t, m tangent and director of a segment, joint i between segments i-1 and i; u = (k_1, k_2, twist)
 // integrated strains; g_a gradient of strain a when the outer segment turns (the inner one feels the opposite);
@@ -29,7 +29,7 @@ struct StaticJoint {
     Vector g[3];         // gradients of the three strains
     Vector dual[3];      // s_a = dual_a . M
     Many s[3];           // what the joint supplies [N m]
-    Many dl, live;       // mean length of both segments; 1 where the outer segment can turn
+    Many dl, live;       // mean length of both segments; 1 where one of them can turn
 
     StaticJoint() = default;
 
@@ -48,14 +48,15 @@ struct StaticJoint {
 /// A block of strands at the groomed points.
 struct StaticBlock {
     int P;
-    Vector *x, *director, *t, *F, *W; // points, directors, tangents; loads of points, forces through segments
-    Many *l, *turns;                  // length of a segment; 1 where it can turn
+    Vector *x, *director, *t;         // points, directors, tangents
+    Vector *F, *couple, *W;           // loads of points and couples on segments; forces through segments
+    Many *l, *turns, *held;           // length of a segment, 1 where it can turn; 1 where a point is held
     StaticJoint *joint;               // 1 .. P-2
     Many B[3];                        // B1, B2, C
 
     StaticBlock(Arena &arena, int points) : P(points), joint(arena.take<StaticJoint>(P)) {
-        for (auto **array : {&x, &director, &t, &F, &W}) *array = arena.take<Vector>(P);
-        for (auto **array : {&l, &turns}) *array = arena.take<Many>(P);
+        for (auto **array : {&x, &director, &t, &F, &couple, &W}) *array = arena.take<Vector>(P);
+        for (auto **array : {&l, &turns, &held}) *array = arena.take<Many>(P);
     }
 
     /// Tangents and joints, from points, directors and what is held.
@@ -67,7 +68,7 @@ struct StaticBlock {
         for (int i = 1; i < P - 1; ++i) {
             joint[i] = StaticJoint(t[i - 1], t[i], director[i - 1], director[i]);
             joint[i].dl = 0.5 * (l[i - 1] + l[i]);
-            joint[i].live = turns[i];
+            joint[i].live = maximum<double>(turns[i - 1], turns[i]);
         }
     }
 
@@ -78,7 +79,7 @@ struct StaticBlock {
             force = force + F[j + 1];
             W[j] = force;
             if (j == 0) break;
-            moment = moment + l[j] * cross(t[j], force);
+            moment = moment + couple[j] + l[j] * cross(t[j], force);
             for (int a = 0; a < 3; ++a) joint[j].s[a] = joint[j].live * dot(joint[j].dual[a], moment);
         }
     }

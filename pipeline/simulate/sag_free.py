@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
-from pipeline.config.schema import SagFree
+from pipeline.config.schema import SagFree, Simulate
 from pipeline.errors import InputError
 
 _NEAR = 2e-3  # [m] the head carries points up to this distance from the skin,
@@ -37,6 +37,8 @@ class Report:
     """Guides that would have to be stiffer than sag_free.max_factor allows: they will sag."""
     leaning: int
     """Guides of which the head carries a part."""
+    hinged: int
+    """Guides without a clamped root: they keep the groom as rest shape, and will sag."""
     below_skin: int
     """Guides with points groomed below the skin."""
 
@@ -51,6 +53,8 @@ class Report:
             parts.append(
                 f"sag-free: {self.over_max_factor} guides will sag: they need more than simulate.sag_free.max_factor"
             )
+        if self.hinged:
+            parts.append(f"sag-free: {self.hinged} guides will sag: their roots are not clamped")
         if self.below_skin:
             parts.append(
                 f"sag-free: {self.below_skin} guides will move: they have points groomed below the skin"
@@ -82,10 +86,9 @@ def hold_groom(
 ) -> Start:
     """Change strains, stiffness and contact offsets of a rest shape so that its points are at rest.
 
-    Gravity [m/s^2] and `rest.load` act in the world, in which the head has this pose (4, 4). Raises InputError for
-    guides that are held at their tips, or have no stiffness.
+    Gravity [m/s^2] and `rest.load` act in the world, in which the head has this pose (4, 4). Guides without a clamped
+    root keep the groom as their rest shape.
     """
-    _check(rest)
     turn = pose[:3, :3]
     load = np.ascontiguousarray(rest.mass[..., None] * (np.array(gravity) @ turn) + rest.load @ turn)
     distance, normal = _head(rest, field)
@@ -108,6 +111,7 @@ def hold_groom(
         largest_factor=float(found.factor.max(initial=1.0)),
         over_max_factor=int((found.needed > found.factor).sum()),
         leaning=int(carried.any(axis=1).sum()),
+        hinged=int((~_clamped(rest)).sum()),
         below_skin=int((free & ~outside).any(axis=1).sum()),
     )
     return Start(found.tension.copy(), carried.astype(np.uint8), report)
@@ -123,7 +127,11 @@ def net_force(rest: kernels.RestShape, load: _Vectors, tension: _Vectors) -> flo
     force[:, :-1] += pull
     force[:, 1:] -= pull
     weights = np.linalg.norm(force, axis=2) / (9.81 * rest.mass)
-    return float(weights[rest.held == 0].max(initial=0.0))
+    return float(weights[(rest.held == 0) & _clamped(rest)[:, None]].max(initial=0.0))
+
+
+def _clamped(rest: kernels.RestShape) -> NDArray[np.bool_]:
+    return np.asarray((rest.held[:, :2] > 0).all(axis=1))
 
 
 def tip_drift(
@@ -135,19 +143,30 @@ def tip_drift(
     return np.asarray(np.linalg.norm(points[:, -1] - groomed, axis=1) / length)
 
 
-def _check(rest: kernels.RestShape) -> None:
-    held = rest.held > 0
-    inside = (held[:, 1:] > held[:, :-1]).any(axis=1)
-    if inside.any():
+def wanted(simulate: Simulate, rest: kernels.RestShape) -> bool:
+    """Whether the config wants a sag-free rest shape, and can have one.
+
+    "auto" takes what there is; for "sag_free", raises InputError where there is none: guides without stiffness or
+    without a clamped root.
+    """
+    hair = simulate.hair
+    stiff = hair.young_modulus > 0 and hair.shear_modulus > 0
+    if simulate.rest == "auto":
+        return simulate.torsion == "kirchhoff" and stiff
+    if simulate.rest == "groom":
+        return False
+    if not stiff:
         raise InputError(
-            f'simulate.rest: "sag_free" cannot hold guide {int(np.argmax(inside))}: it is pinned beyond its root, '
-            'and what its pins carry does not follow from the groom; unpin the tips or set simulate.rest = "groom"'
+            'simulate.rest: "sag_free" needs stiffness to hold the groom with: simulate.hair.young_modulus and '
+            'simulate.hair.shear_modulus must be positive; or set simulate.rest = "groom"'
         )
-    if not (held[:, :2].all() and (rest.bending > 0).all() and (rest.twisting > 0).all()):
+    hinged = ~_clamped(rest)
+    if hinged.any():
         raise InputError(
-            'simulate.rest: "sag_free" needs two held points at every root and stiffness to hold with; '
-            "check simulate.hair.young_modulus and simulate.hair.shear_modulus"
+            f'simulate.rest: "sag_free" cannot hold guide {int(np.argmax(hinged))}: its root is not clamped, so that '
+            'nothing keeps it from turning; hold two points (groom.pins) or set simulate.rest = "auto"'
         )
+    return True
 
 
 def _head(rest: kernels.RestShape, field: kernels.DistanceField | None) -> tuple[_Vectors, _Vectors]:

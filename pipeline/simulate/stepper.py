@@ -14,7 +14,7 @@ from pipeline.errors import InputError
 from pipeline.simulate.hair_contact import Cost, neighbours
 from pipeline.simulate.motion import hand_motion, head_motion
 from pipeline.simulate.rest import rest_shape, settling, step_settings
-from pipeline.simulate.sag_free import Report, hold_groom
+from pipeline.simulate.sag_free import Report, hold_groom, wanted
 from pipeline.simulate.screws import Pose, inverse, place
 from pipeline.simulate.wind import wind
 from pipeline.strands.held import HAND
@@ -158,7 +158,7 @@ class Simulation:
         state = kernels.at_rest(
             np.ascontiguousarray(moved, precision), np.ascontiguousarray(directors, precision)
         )
-        if self.simulate.sag_free_start:
+        if wanted(self.simulate, self.rest):
             start = hold_groom(self.rest, self.field, self.simulate.gravity, pose, self.simulate.sag_free)
             state.tension[:], state.contact[:] = start.tension, start.contact
             self.sag_free = start.report

@@ -127,8 +127,8 @@ class Simulate(Section):
     """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond."""
     torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "kirchhoff"
     """Torsion model: "kirchhoff" (material frames), "rotor" (4-point), "frenet" (the lecture's, regularised) or "none"."""
-    rest: Literal["groom", "sag_free"] | None = None
-    """Rest shape: the "groom" itself, which then sags under gravity, or "sag_free", one that holds the groom; unset, "sag_free" where the torsion model can ("kirchhoff")."""
+    rest: Literal["auto", "groom", "sag_free"] = "auto"
+    """Rest shape: the "groom" itself, which then sags under gravity; "sag_free", one that holds the groom (torsion "kirchhoff"); or "auto", sag-free where that can be."""
     sag_free: SagFree = SagFree()
     """How stable a sag-free groom is made."""
     relaxation: Literal["newton", "sweep"] = "newton"
@@ -169,15 +169,12 @@ class Simulate(Section):
             )
         return self
 
-    @property
-    def sag_free_start(self) -> bool:
-        """Whether the rest shape is one that holds the groom."""
-        return self.torsion == "kirchhoff" and self.rest != "groom"
-
     @field_validator("rest")
     @classmethod
-    def _torsion_holds_it(cls, rest: str | None, info: ValidationInfo) -> str | None:
+    def _torsion_holds_it(cls, rest: str, info: ValidationInfo) -> str:
         torsion = info.data.get("torsion", "kirchhoff")
         if rest == "sag_free" and torsion != "kirchhoff":
-            raise ValueError(f'"sag_free" needs simulate.torsion = "kirchhoff": {_CANNOT_HOLD[torsion]}')
+            raise ValueError(
+                f'"sag_free" needs simulate.torsion = "kirchhoff": {_CANNOT_HOLD[torsion]}; or take "auto"'
+            )
         return rest
