@@ -100,6 +100,18 @@ template <class Real> RINGLET_INLINE bool any(Mask<Real> mask) {
     return bits != 0;
 }
 
+/// A bit for each lane that is set.
+template <class Real> RINGLET_INLINE uint32_t set_lanes(Mask<Real> mask) {
+#ifdef __AVX512F__
+    if constexpr (sizeof(Real) == 4) return uint32_t(_mm512_cmplt_epi32_mask(__m512i(mask), _mm512_setzero_si512()));
+    else return uint32_t(_mm512_cmplt_epi64_mask(__m512i(mask), _mm512_setzero_si512()));
+#else
+    uint32_t bits = 0;
+    for (int i = 0; i < kLanes<Real>; ++i) bits |= uint32_t(mask[i] != 0) << i;
+    return bits;
+#endif
+}
+
 template <class Real> struct Vec3 {
     Lanes<Real> x, y, z;
 
@@ -115,5 +127,9 @@ template <class Real> struct Vec3 {
         return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
     }
 };
+
+template <class Real> Vec3<Real> broadcast(const double *a) {
+    return {splat(Real(a[0])), splat(Real(a[1])), splat(Real(a[2]))};
+}
 
 } // namespace ringlet
