@@ -63,9 +63,11 @@ struct RodForce {
         const Mask<float> touching = (allowed > distance) & (push > none);
         const Floats grip = law.mu * push * reciprocal<float>(maximum<float>(speed, splat(RodLaw::kSlow)));
         force = select(touching, push * n - grip * sliding, Points{});
-        // Twice the own part of the exact matrix: stable though the other rod's motion is not known to the solve
-        normal = select<float>(spring < slow, splat(2 * (law.k * law.theta_dt + law.c_n)), splat(2 * law.c_p));
-        normal = select<float>(touching, normal, none);
+        // The slope of the law, or of its chord to where the push ends: rods do not shoot out of each other in a step.
+        // Twice the own part of the exact matrix: stable though the other rod's motion is not known to the solve.
+        const Floats left = maximum<float>(law.v_p - parting, splat(1e-3f * law.v_p));
+        const Floats slope = maximum<float>(splat(law.k * law.theta_dt + law.c_n), push * reciprocal<float>(left));
+        normal = select<float>(touching, 2 * slope, none);
         along = select<float>(touching, 2 * grip, none);
     }
 };

@@ -21,18 +21,16 @@ class HairCapsules final : public Neighbours {
     const CapsuleSettings settings;
     const int S, P;
     Closeness allowed;               // strands that are groomed nearer than 2 r may stay as near
-    std::vector<uint8_t> takes_part; // 0 where both points are held: a root
     double longest = 0, mass = 0;    // longest segment [m]; mean mass of a point [kg]
     double lowest[3], highest[3];    // how far strands reach [m]
 
     HairCapsules(const RestShape &shape, const CapsuleSettings &given)
-        : settings(given), S(shape.S), P(shape.P), allowed(S), takes_part(size_t(S) * (P - 1)) {
+        : settings(given), S(shape.S), P(shape.P), allowed(S) {
         double longest_strand = 0;
         for (int s = 0; s < S; ++s) {
             double length = 0;
             for (int j = 0; j + 1 < P; ++j) {
                 const int k = s * (P - 1) + j;
-                takes_part[k] = !(shape.held[s * P + j] && shape.held[s * P + j + 1]);
                 length += shape.length[k];
                 longest = std::max(longest, shape.length[k]);
             }
@@ -48,6 +46,9 @@ class HairCapsules final : public Neighbours {
         }
         measure_groom(shape);
     }
+
+    /// Segment j of strand s is rod s (P - 1) + j.
+    int rods() const { return S * (P - 1); }
 
     /// The middles of two segments that touch are no farther apart; they may be strained by a percent.
     double cell() const { return 1.01 * longest + 2 * settings.radius; }
@@ -66,14 +67,14 @@ class HairCapsules final : public Neighbours {
 
   private:
     void measure_groom(const RestShape &shape) {
-        RodGrid rods(allowed, int(takes_part.size()), P - 1, cell(), law(0));
-        for (int k = 0; k < int(takes_part.size()); ++k) {
+        RodGrid grid(allowed, rods(), P - 1, cell(), law(0));
+        for (int k = 0; k < rods(); ++k) {
             float ends[2][6] = {};
             for (int axis = 0; axis < 6; ++axis)
                 ends[axis / 3][axis % 3] = float(shape.points[3 * (k / (P - 1) * P + k % (P - 1)) + axis]);
-            rods.put(k, ends[0], ends[1], takes_part[k]);
+            grid.put(k, ends[0], ends[1], true);
         }
-        rods.measure([&](int a, int b, float distance) { allowed.note(a, b, distance); });
+        grid.measure([&](int a, int b, float distance) { allowed.note(a, b, distance); });
     }
 };
 
@@ -83,7 +84,7 @@ template <class Real> class CapsuleForce final : public NeighbourForce<Real> {
   public:
     CapsuleForce(const HairCapsules &capsules, double theta_dt)
         : capsules_(capsules), theta_dt_(splat(Real(theta_dt))),
-          grid_(capsules.allowed, int(capsules.takes_part.size()), capsules.P - 1, capsules.cell(),
+          grid_(capsules.allowed, capsules.rods(), capsules.P - 1, capsules.cell(),
                 capsules.law(theta_dt)) {}
 
     void see(const Resident<Real> &resident, int, const Pose &head) override {
@@ -103,8 +104,7 @@ template <class Real> class CapsuleForce final : public NeighbourForce<Real> {
                 inside[i % 2][lane] = here[lane] != 0;
                 if (i == 0) continue;
                 const int rod = resident.index.strand[lane] * (capsules_.P - 1) + i - 1;
-                grid_.put(rod, ends[(i - 1) % 2][lane], end,
-                          capsules_.takes_part[rod] && inside[0][lane] && inside[1][lane]);
+                grid_.put(rod, ends[(i - 1) % 2][lane], end, inside[0][lane] && inside[1][lane]);
             }
         }
     }

@@ -14,7 +14,12 @@
 
 namespace ringlet {
 
-/// Segments as structure of arrays: group 0 middles, 1 halves, 2 and 3 their velocities.
+/// A segment: 0-2 its middle, 3-5 its half, 6-11 their velocities; a cache line.
+struct alignas(64) Rod {
+    float part[12];
+};
+
+/// Segments as structure of arrays, in groups of three: middles, halves, and their velocities.
 struct Rods {
     std::vector<float> part[12];
 
@@ -23,11 +28,7 @@ struct Rods {
     }
 
     RINGLET_INLINE Points load(int group, size_t at) const {
-        Points p;
-        __builtin_memcpy(&p.x, &part[3 * group][at], sizeof p.x);
-        __builtin_memcpy(&p.y, &part[3 * group + 1][at], sizeof p.y);
-        __builtin_memcpy(&p.z, &part[3 * group + 2][at], sizeof p.z);
-        return p;
+        return {read(part[3 * group], at), read(part[3 * group + 1], at), read(part[3 * group + 2], at)};
     }
 
     RINGLET_INLINE Points pick(int group, const int *at) const {
@@ -36,6 +37,12 @@ struct Rods {
 
     RINGLET_INLINE Points every(int group, size_t at) const {
         return {splat(part[3 * group][at]), splat(part[3 * group + 1][at]), splat(part[3 * group + 2][at])};
+    }
+
+    static RINGLET_INLINE Floats read(const std::vector<float> &values, size_t at) {
+        Floats result;
+        __builtin_memcpy(&result, &values[at], sizeof result);
+        return result;
     }
 
   private:
@@ -103,41 +110,36 @@ struct RodLoad {
 class RodGrid {
     static constexpr int W = kLanes<float>;
     static constexpr int kChunk = 64;   // rods that a thread takes at a time
-    static constexpr int kFound = 1024; // candidates that are kept before they are met
+    static constexpr int kRange = 2048; // rods whose extent is one thread's work
 
   public:
     /// `allowed`: see Closeness; `cell` [m]: the middles of two rods that touch are no farther apart.
     RodGrid(const Closeness &allowed, int count, int per_strand, double cell, const RodLaw &law)
-        : allowed_(allowed), per_strand_(per_strand), cell_size_(float(cell)), law_(law), valid_(count), touched_(count),
-          loads_(count), cell_(count) {
-        all_.resize(count);
-    }
+        : allowed_(allowed), per_strand_(per_strand), cell_size_(float(cell)), law_(law), all_(count), valid_(count),
+          touched_(count), loads_(count), cell_(count), ranges_((count + kRange - 1) / kRange) {}
 
     /// Puts a rod in: its ends, each a point and its velocity. `valid`: it may touch others.
     void put(int rod, const float (&a)[6], const float (&b)[6], bool valid) {
         for (int k = 0; k < 6; ++k) {
             const int part = k < 3 ? k : k + 3;
-            all_.part[part][rod] = 0.5f * (a[k] + b[k]);
-            all_.part[part + 3][rod] = 0.5f * (b[k] - a[k]);
+            all_[rod].part[part] = 0.5f * (a[k] + b[k]);
+            all_[rod].part[part + 3] = 0.5f * (b[k] - a[k]);
         }
         valid_[rod] = valid;
     }
 
     /// Works out the loads. Called by every thread of a parallel region.
     void work() {
-#pragma omp single
         sort();
         const int count = int(order_.size());
         fill();
+        Nearby &nearby = nearby_of_thread();
 #pragma omp for schedule(dynamic, 1)
         for (int chunk = 0; chunk < (count + kChunk - 1) / kChunk; ++chunk) {
-            Runs runs;
-            int last = -1;
             for (int place = chunk * kChunk; place < std::min(count, (chunk + 1) * kChunk); ++place) {
                 const int cell = cell_[order_[place]];
-                if (cell != last) runs = around(cell);
-                last = cell;
-                meet_all(place, runs);
+                if (place == chunk * kChunk || cell != cell_[order_[place - 1]]) collect(cell, nearby);
+                meet_all(place, nearby);
             }
         }
     }
@@ -146,19 +148,17 @@ class RodGrid {
     template <class Note> void measure(Note note) {
         sort();
         fill();
-        int found[kFound + W];
+        Nearby nearby;
         for (int place = 0; place < int(order_.size()); ++place) {
-            const Runs runs = around(cell_[order_[place]]);
-            for (int k = 0; k < 9; ++k)
-                for (int at = runs.begin[k]; at < runs.end[k]; at += W) {
-                    const int count = find(place, at, runs.end[k], found, 0);
-                    std::fill(found + count, found + W, count > 0 ? found[0] : place);
-                    const Closest near = closest(place, found, Mask<float>{});
-                    const Floats square = dot(near.gap, near.gap);
-                    for (int lane = 0; lane < count; ++lane)
-                        if (square[lane] < law_.reach * law_.reach)
-                            note(strand_[place], strand_[found[lane]], std::sqrt(square[lane]));
-                }
+            collect(cell_[order_[place]], nearby);
+            const int count = find(place, nearby);
+            for (int done = 0; done < count; done += W) {
+                const Closest near = closest(place, &nearby.found[done], Mask<float>{});
+                const Floats square = dot(near.gap, near.gap);
+                for (int lane = 0; lane < std::min(W, count - done); ++lane)
+                    if (square[lane] < law_.reach * law_.reach)
+                        note(strand_[place], strand_[nearby.found[done + lane]], std::sqrt(square[lane]));
+            }
         }
     }
 
@@ -166,9 +166,23 @@ class RodGrid {
     const RodLoad *load(int rod) const { return touched_[rod] ? &loads_[rod] : nullptr; }
 
   private:
-    struct Runs {
-        int begin[9], end[9];
+    /// The rods of the 27 cells around one, and which of them a rod may touch: what a thread works with.
+    struct Nearby {
+        std::vector<float> x, y, z, limit;
+        std::vector<int> strand, place, found;
+        int count = 0;
+
+        void make_room(size_t rods) {
+            if (x.size() >= rods + 2 * W) return;
+            for (auto *values : {&x, &y, &z, &limit}) values->resize(2 * rods + 2 * W);
+            for (auto *values : {&strand, &place, &found}) values->resize(2 * rods + 2 * W);
+        }
     };
+
+    static Nearby &nearby_of_thread() {
+        thread_local Nearby nearby;
+        return nearby;
+    }
 
     /// Sums over the contacts of a rod, in lanes.
     struct Sums {
@@ -180,46 +194,73 @@ class RodGrid {
     const int per_strand_;
     const float cell_size_;
     const RodLaw law_;
-    Rods all_, sorted_;
+    std::vector<Rod> all_;
+    Rods sorted_;
+    std::vector<float> limit_; // square of how near to a rod's middle a segment must come to touch it
     std::vector<uint8_t> valid_, touched_;
     std::vector<RodLoad> loads_;
     std::vector<int> cell_, first_, order_, strand_; // cell of a rod; first place of a cell; rod and strand at a place
-    int n_[3] = {1, 1, 1};
+    int from_[3] = {0, 0, 0}, n_[3] = {1, 1, 1};
+    struct Extent {
+        float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
+    };
+    std::vector<Extent> ranges_;
 
     /// Counting sort by cells; rods of one cell stay in their order.
     void sort() {
         const int count = int(valid_.size());
-        const float per_cell = 1 / cell_size_;
-        float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
-        for (int axis = 0; axis < 3; ++axis)
-            for (int k = 0; k < count; ++k) {
-                if (!valid_[k]) continue;
-                low[axis] = std::min(low[axis], all_.part[axis][k]);
-                high[axis] = std::max(high[axis], all_.part[axis][k]);
-            }
-        int from[3];
-        for (int axis = 0; axis < 3; ++axis) {
-            if (low[axis] > high[axis]) low[axis] = high[axis] = 0;
-            from[axis] = int(std::floor(low[axis] * per_cell)) - 1;
-            n_[axis] = int(std::floor(high[axis] * per_cell)) + 2 - from[axis];
-        }
-        first_.assign(size_t(n_[0]) * n_[1] * n_[2] + 1, 0);
-        int kept = 0;
+#pragma omp for schedule(static)
+        for (int range = 0; range < int(ranges_.size()); ++range) measure_extent(range);
+#pragma omp single
+        span_cells();
+#pragma omp for schedule(static)
         for (int k = 0; k < count; ++k) {
             touched_[k] = 0;
+            cell_[k] = -1;
             if (!valid_[k]) continue;
             int at[3];
-            for (int axis = 0; axis < 3; ++axis) at[axis] = int(std::floor(all_.part[axis][k] * per_cell)) - from[axis];
+            for (int axis = 0; axis < 3; ++axis) at[axis] = cell_along(all_[k].part[axis]) - from_[axis];
             cell_[k] = (at[2] * n_[1] + at[1]) * n_[0] + at[0];
-            ++first_[cell_[k] + 1];
-            ++kept;
         }
+#pragma omp single
+        order_cells();
+    }
+
+    int cell_along(float x) const { return int(std::floor(x * (1 / cell_size_))); }
+
+    void measure_extent(int range) {
+        Extent extent;
+        for (int k = range * kRange; k < std::min(int(valid_.size()), (range + 1) * kRange); ++k)
+            for (int axis = 0; axis < 3 && valid_[k]; ++axis) {
+                extent.low[axis] = std::min(extent.low[axis], all_[k].part[axis]);
+                extent.high[axis] = std::max(extent.high[axis], all_[k].part[axis]);
+            }
+        ranges_[range] = extent;
+    }
+
+    /// The box of cells around all rods, and one more on every side.
+    void span_cells() {
+        for (int axis = 0; axis < 3; ++axis) {
+            float low = 1e30f, high = -1e30f;
+            for (const Extent &extent : ranges_)
+                low = std::min(low, extent.low[axis]), high = std::max(high, extent.high[axis]);
+            if (low > high) low = high = 0; // no rod is valid
+            from_[axis] = cell_along(low) - 1;
+            n_[axis] = cell_along(high) + 2 - from_[axis];
+        }
+    }
+
+    void order_cells() {
+        first_.assign(size_t(n_[0]) * n_[1] * n_[2] + 1, 0);
+        for (int cell : cell_)
+            if (cell >= 0) ++first_[cell + 1];
         for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
-        order_.resize(kept), strand_.resize(kept + W), sorted_.resize(kept);
-        // Filling moves the start of a cell to its end; the cell before has it then
-        for (int k = count - 1; k >= 0; --k)
-            if (valid_[k]) order_[--first_[cell_[k] + 1]] = k;
-        for (size_t c = 0; c + 1 < first_.size(); ++c) first_[c] = first_[c + 1];
+        const int kept = first_.back();
+        order_.resize(kept), strand_.resize(kept + W), limit_.resize(kept + W), sorted_.resize(kept);
+        // Filling backwards moves the end of a cell to its start; the cell before has it then
+        for (int k = int(cell_.size()) - 1; k >= 0; --k)
+            if (cell_[k] >= 0) order_[--first_[cell_[k] + 1]] = k;
+        std::copy(first_.begin() + 1, first_.end(), first_.begin());
         first_.back() = kept;
     }
 
@@ -229,64 +270,78 @@ class RodGrid {
 #pragma omp for schedule(static)
         for (int place = 0; place < count; ++place) {
             strand_[place] = order_[place] / per_strand_;
-            for (int k = 0; k < 12; ++k) sorted_.part[k][place] = all_.part[k][order_[place]];
+            const Rod &rod = all_[order_[place]];
+            for (int k = 0; k < 12; ++k) sorted_.part[k][place] = rod.part[k];
+            const float *h = rod.part + 3, limit = law_.reach + std::sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
+            limit_[place] = 1.001f * limit * limit;
         }
     }
 
-    /// The places of the rods in the cells around one: 9 runs of 3 cells.
-    Runs around(int cell) const {
-        Runs runs;
-        int k = 0;
-        for (int z = -1; z <= 1; ++z)
-            for (int y = -1; y <= 1; ++y, ++k) {
-                const int middle = cell + (z * n_[1] + y) * n_[0];
-                runs.begin[k] = first_[middle - 1], runs.end[k] = first_[middle + 2];
+    /// Copies what `find` reads, so that it runs through whole vectors: 9 runs of 3 cells each.
+    void collect(int cell, Nearby &nearby) const {
+        nearby.count = 0;
+        for (int run = 0; run < 9; ++run) {
+            const int middle = cell + ((run / 3 - 1) * n_[1] + run % 3 - 1) * n_[0];
+            const int begin = first_[middle - 1], count = first_[middle + 2] - begin;
+            nearby.make_room(nearby.count + count);
+            for (int k = 0; k < count; k += W) {
+                const int to = nearby.count + k, from = begin + k;
+                copy(sorted_.part[0], from, nearby.x, to), copy(sorted_.part[1], from, nearby.y, to);
+                copy(sorted_.part[2], from, nearby.z, to), copy(limit_, from, nearby.limit, to);
+                copy(strand_, from, nearby.strand, to);
+                for (int lane = 0; lane < W; ++lane) nearby.place[to + lane] = from + lane;
             }
-        return runs;
+            nearby.count += count;
+        }
+        for (int lane = 0; lane < W; ++lane) nearby.limit[nearby.count + lane] = 0; // nothing is near enough to these
     }
 
-    void meet_all(int place, const Runs &runs) {
-        int found[kFound + W], count = 0;
+    template <class T> static RINGLET_INLINE void copy(const std::vector<T> &from, int at, std::vector<T> &to, int place) {
+        __builtin_memcpy(&to[place], &from[at], W * sizeof(T));
+    }
+
+    void meet_all(int place, Nearby &nearby) {
+        const int count = find(place, nearby);
         Sums sums;
-        for (int k = 0; k < 9; ++k)
-            for (int at = runs.begin[k]; at < runs.end[k]; at += W) {
-                count = find(place, at, runs.end[k], found, count);
-                if (count < kFound) continue;
-                for (int done = 0; done < kFound; done += W) meet(place, found + done, W, sums);
-                count -= kFound;
-                std::copy_n(found + kFound, count, found);
-            }
-        for (int done = 0; done < count; done += W) meet(place, found + done, std::min(W, count - done), sums);
+        for (int done = 0; done < count; done += W)
+            meet(place, &nearby.found[done], std::min(W, count - done), sums);
         if (!sums.any) return;
         RodLoad &load = loads_[order_[place]];
         for (int end = 0; end < 2; ++end)
-            for (int k = 0; k < 9; ++k) {
-                float sum = 0;
-                for (int lane = 0; lane < W; ++lane) sum += sums.at[end][k][lane];
-                load.at[end][k] = sum;
-            }
+            for (int k = 0; k < 9; ++k) load.at[end][k] = total(sums.at[end][k]);
         touched_[order_[place]] = 1;
     }
 
-    /// Appends the places at .. at + W - 1 whose rods may touch: another strand, middle near enough to this segment.
-    RINGLET_INLINE int find(int place, int at, int end, int *found, int count) const {
-        const Points half = sorted_.every(1, place), apart = sorted_.load(0, at) - sorted_.every(0, place);
-        const Points other = sorted_.load(1, at);
-        const Floats along = clamp_one(dot(apart, half) * reciprocal<float>(dot(half, half)));
-        const Points away = apart - along * half;
-        const Floats size = dot(other, other), distance = dot(away, away);
-        // |away| < reach + |other|, without roots: (a + b)^2 <= 2 a^2 + 2 b^2 would let too many pass
-        const Floats excess = distance - size - splat(law_.reach * law_.reach);
-        Mask<float> near = (excess < 0) | (excess * excess < (4 * law_.reach * law_.reach) * size);
-        Mask<float> strand;
-        __builtin_memcpy(&strand, &strand_[at], sizeof strand);
-        near &= strand != strand_[place];
-        for (uint32_t bits = set_lanes<float>(near) & lanes_before(end - at); bits; bits &= bits - 1)
-            found[count++] = at + __builtin_ctz(bits);
+    /// Finds the places of rods that may touch: another strand, middle near enough to this segment. The list is filled
+    /// up to whole vectors. Returns how many there are.
+    int find(int place, Nearby &nearby) const {
+        const Points middle = sorted_.every(0, place), half = sorted_.every(1, place);
+        const Floats per_square = reciprocal<float>(dot(half, half));
+        const int strand = strand_[place];
+        int count = 0;
+        for (int at = 0; at < nearby.count; at += W) {
+            const Points apart = Points{Rods::read(nearby.x, at), Rods::read(nearby.y, at), Rods::read(nearby.z, at)} - middle;
+            const Points away = apart - clamp_one(dot(apart, half) * per_square) * half;
+            Mask<float> other;
+            __builtin_memcpy(&other, &nearby.strand[at], sizeof other);
+            const Mask<float> near = (dot(away, away) < Rods::read(nearby.limit, at)) & (other != strand);
+            count += write_set_lanes(near, at, &nearby.found[count]);
+        }
+        for (int k = 0; k < count; ++k) nearby.found[k] = nearby.place[nearby.found[k]];
+        if (count > 0) std::fill_n(&nearby.found[count], W, nearby.found[0]);
         return count;
     }
 
-    static RINGLET_INLINE uint32_t lanes_before(int count) { return count >= W ? 0xffff : (1u << count) - 1; }
+    /// Sum over the lanes, by halves.
+    static RINGLET_INLINE float total(Floats a) {
+        typedef float Eight __attribute__((vector_size(32)));
+        typedef float Four __attribute__((vector_size(16)));
+        const Eight eight = __builtin_shufflevector(a, a, 0, 1, 2, 3, 4, 5, 6, 7) +
+                            __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15);
+        const Four four = __builtin_shufflevector(eight, eight, 0, 1, 2, 3) +
+                          __builtin_shufflevector(eight, eight, 4, 5, 6, 7);
+        return (four[0] + four[2]) + (four[1] + four[3]);
+    }
 
     /// Of this rod and W found ones, the lower of each pair first.
     RINGLET_INLINE Closest closest(int place, const int *found, Mask<float> second) const {
@@ -297,8 +352,7 @@ class RodGrid {
     }
 
     /// Adds the contacts with the first `count` of W found rods.
-    void meet(int place, int *found, int count, Sums &sums) const {
-        for (int lane = count; lane < W; ++lane) found[lane] = found[0];
+    void meet(int place, const int *found, int count, Sums &sums) const {
         const int rod = order_[place];
         Mask<float> second, mine; // this rod is the second of the pair; lanes that are in use
         for (int lane = 0; lane < W; ++lane) {

@@ -112,6 +112,21 @@ template <class Real> RINGLET_INLINE uint32_t set_lanes(Mask<Real> mask) {
 #endif
 }
 
+/// Writes the numbers of the lanes that are set, counted from `first`, one after the other, and how many there are
+/// comes back. All of to[0 .. kLanes - 1] may be written to.
+RINGLET_INLINE int write_set_lanes(Mask<float> mask, int first, int *to) {
+#ifdef __AVX512F__
+    const __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const uint32_t bits = set_lanes<float>(mask);
+    _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(__mmask16(bits), _mm512_add_epi32(lanes, _mm512_set1_epi32(first))));
+    return __builtin_popcount(bits);
+#else
+    int count = 0;
+    for (uint32_t bits = set_lanes<float>(mask); bits; bits &= bits - 1) to[count++] = first + __builtin_ctz(bits);
+    return count;
+#endif
+}
+
 template <class Real> struct Vec3 {
     Lanes<Real> x, y, z;
 
