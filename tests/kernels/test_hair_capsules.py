@@ -174,7 +174,7 @@ def slide_on_a_ramp(slope: float) -> float:
     wires = [np.linspace(-0.1, 0.1, 16)[:, None] * down + [0, 0, z] for z in (-0.01, 0.01)]
     short = np.linspace([0, 0, -0.02], [0, 0, 0.02], 16)
     held = np.array([[1] * 16, [1] * 16, [0] * 16], np.uint8)
-    rest = shape(np.array([*wires, short + [0, 0.05, 0]]), held=held)
+    rest = shape(np.array([*wires, short + np.array([0, 0.05, 0])]), held=held)
     above = 2.4e-3 * np.array([np.sin(slope), np.cos(slope), 0])
     state = kernels.at_rest(np.array([*wires, short + above]))
     still = drive(60)
