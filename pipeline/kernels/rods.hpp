@@ -12,6 +12,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <omp.h>
+
 namespace ringlet {
 
 /// A segment: 0-2 its middle, 3-5 its half, 6-11 their velocities; a cache line.
@@ -133,14 +135,12 @@ class RodGrid {
         sort();
         const int count = int(order_.size());
         fill();
-        Nearby &nearby = nearby_of_thread();
+        Nearby &nearby = nearby_[omp_get_thread_num()];
 #pragma omp for schedule(dynamic, 1)
         for (int chunk = 0; chunk < (count + kChunk - 1) / kChunk; ++chunk) {
-            for (int place = chunk * kChunk; place < std::min(count, (chunk + 1) * kChunk); ++place) {
-                const int cell = cell_[order_[place]];
-                if (place == chunk * kChunk || cell != cell_[order_[place - 1]]) collect(cell, nearby);
-                meet_all(place, nearby);
-            }
+            find_pairs(chunk * kChunk, std::min(count, (chunk + 1) * kChunk), nearby);
+            keep_near(nearby);
+            for (int at = 0; at < nearby.near_count; at += W) meet(nearby, at);
         }
     }
 
@@ -149,15 +149,15 @@ class RodGrid {
         sort();
         fill();
         Nearby nearby;
-        for (int place = 0; place < int(order_.size()); ++place) {
-            collect(cell_[order_[place]], nearby);
-            const int count = find(place, nearby);
-            for (int done = 0; done < count; done += W) {
-                const Closest near = closest(place, &nearby.found[done], Mask<float>{});
-                const Floats square = dot(near.gap, near.gap);
-                for (int lane = 0; lane < std::min(W, count - done); ++lane)
-                    if (square[lane] < law_.reach * law_.reach)
-                        note(strand_[place], strand_[nearby.found[done + lane]], std::sqrt(square[lane]));
+        for (int place = 0; place < int(order_.size()); place += kChunk) {
+            find_pairs(place, std::min(int(order_.size()), place + kChunk), nearby);
+            keep_near(nearby);
+            for (int at = 0; at < nearby.near_count; at += W) {
+                const Pairs pairs(nearby, at);
+                const Points gap = closest(pairs.own, pairs.other).gap;
+                const Floats distance = square_root<float>(dot(gap, gap));
+                for (int lane = 0; lane < std::min(W, nearby.near_count - at); ++lane)
+                    note(strand_[pairs.own[lane]], strand_[pairs.other[lane]], distance[lane]);
             }
         }
     }
@@ -166,28 +166,35 @@ class RodGrid {
     const RodLoad *load(int rod) const { return touched_[rod] ? &loads_[rod] : nullptr; }
 
   private:
-    /// The rods of the 27 cells around one, and which of them a rod may touch: what a thread works with.
+    /// What a thread works with: the rods of the 27 cells around one, and the pairs of some rods with others.
     struct Nearby {
         std::vector<float> x, y, z, limit;
         std::vector<int> strand, place, found;
-        int count = 0;
+        std::vector<int> own, other, near; // pairs of places; those of them whose rods are within reach
+        int count = 0, pair_count = 0, near_count = 0;
 
         void make_room(size_t rods) {
             if (x.size() >= rods + 2 * W) return;
             for (auto *values : {&x, &y, &z, &limit}) values->resize(2 * rods + 2 * W);
             for (auto *values : {&strand, &place, &found}) values->resize(2 * rods + 2 * W);
         }
+
+        void make_room_for_pairs(size_t pairs) {
+            if (own.size() >= pairs + 2 * W) return;
+            for (auto *values : {&own, &other, &near}) values->resize(2 * pairs + 2 * W);
+        }
     };
 
-    static Nearby &nearby_of_thread() {
-        thread_local Nearby nearby;
-        return nearby;
-    }
+    /// Places of W pairs of rods that are within reach; past the last pair, the last one again.
+    struct Pairs {
+        int own[W], other[W];
 
-    /// Sums over the contacts of a rod, in lanes.
-    struct Sums {
-        Floats at[2][9] = {};
-        bool any = false;
+        Pairs(const Nearby &nearby, int at) {
+            for (int lane = 0; lane < W; ++lane) {
+                const int pair = nearby.near[std::min(at + lane, nearby.near_count - 1)];
+                own[lane] = nearby.own[pair], other[lane] = nearby.other[pair];
+            }
+        }
     };
 
     const Closeness &allowed_;
@@ -205,6 +212,7 @@ class RodGrid {
         float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
     };
     std::vector<Extent> ranges_;
+    std::vector<Nearby> nearby_; // of each thread
 
     /// Counting sort by cells; rods of one cell stay in their order.
     void sort() {
@@ -256,6 +264,7 @@ class RodGrid {
             if (cell >= 0) ++first_[cell + 1];
         for (size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
         const int kept = first_.back();
+        nearby_.resize(std::max<size_t>(nearby_.size(), omp_get_num_threads()));
         order_.resize(kept), strand_.resize(kept + W), limit_.resize(kept + W), sorted_.resize(kept);
         // Filling backwards moves the end of a cell to its start; the cell before has it then
         for (int k = int(cell_.size()) - 1; k >= 0; --k)
@@ -300,21 +309,18 @@ class RodGrid {
         __builtin_memcpy(&to[place], &from[at], W * sizeof(T));
     }
 
-    void meet_all(int place, Nearby &nearby) {
-        const int count = find(place, nearby);
-        Sums sums;
-        for (int done = 0; done < count; done += W)
-            meet(place, &nearby.found[done], std::min(W, count - done), sums);
-        if (!sums.any) return;
-        RodLoad &load = loads_[order_[place]];
-        for (int end = 0; end < 2; ++end)
-            for (int k = 0; k < 9; ++k) load.at[end][k] = total(sums.at[end][k]);
-        touched_[order_[place]] = 1;
+    /// The pairs of the rods at begin .. end - 1 with rods that may touch them.
+    void find_pairs(int begin, int end, Nearby &nearby) const {
+        nearby.pair_count = 0;
+        for (int place = begin; place < end; ++place) {
+            const int cell = cell_[order_[place]];
+            if (place == begin || cell != cell_[order_[place - 1]]) collect(cell, nearby);
+            find(place, nearby);
+        }
     }
 
-    /// Finds the places of rods that may touch: another strand, middle near enough to this segment. The list is filled
-    /// up to whole vectors. Returns how many there are.
-    int find(int place, Nearby &nearby) const {
+    /// Appends the pairs of one rod with those of other strands whose middle is near enough to its segment.
+    void find(int place, Nearby &nearby) const {
         const Points middle = sorted_.every(0, place), half = sorted_.every(1, place);
         const Floats per_square = reciprocal<float>(dot(half, half));
         const int strand = strand_[place];
@@ -327,71 +333,84 @@ class RodGrid {
             const Mask<float> near = (dot(away, away) < Rods::read(nearby.limit, at)) & (other != strand);
             count += write_set_lanes(near, at, &nearby.found[count]);
         }
-        for (int k = 0; k < count; ++k) nearby.found[k] = nearby.place[nearby.found[k]];
-        if (count > 0) std::fill_n(&nearby.found[count], W, nearby.found[0]);
-        return count;
+        nearby.make_room_for_pairs(nearby.pair_count + count);
+        for (int k = 0; k < count; ++k) {
+            nearby.own[nearby.pair_count + k] = place;
+            nearby.other[nearby.pair_count + k] = nearby.place[nearby.found[k]];
+        }
+        nearby.pair_count += count;
     }
 
-    /// Sum over the lanes, by halves.
-    static RINGLET_INLINE float total(Floats a) {
-        typedef float Eight __attribute__((vector_size(32)));
-        typedef float Four __attribute__((vector_size(16)));
-        const Eight eight = __builtin_shufflevector(a, a, 0, 1, 2, 3, 4, 5, 6, 7) +
-                            __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15);
-        const Four four = __builtin_shufflevector(eight, eight, 0, 1, 2, 3) +
-                          __builtin_shufflevector(eight, eight, 4, 5, 6, 7);
-        return (four[0] + four[2]) + (four[1] + four[3]);
+    /// Keeps the pairs that are within reach.
+    void keep_near(Nearby &nearby) const {
+        nearby.near_count = 0;
+        if (nearby.pair_count == 0) return;
+        for (int lane = 0; lane < W; ++lane) { // the last vector is filled up
+            nearby.own[nearby.pair_count + lane] = nearby.own[0];
+            nearby.other[nearby.pair_count + lane] = nearby.other[0];
+        }
+        for (int at = 0; at < nearby.pair_count; at += W) {
+            const Points gap = closest(&nearby.own[at], &nearby.other[at]).gap;
+            Mask<float> near = dot(gap, gap) < law_.reach * law_.reach;
+            for (int lane = nearby.pair_count - at; lane < W; ++lane) near[lane] = 0;
+            nearby.near_count += write_set_lanes(near, at, &nearby.near[nearby.near_count]);
+        }
     }
 
-    /// Of this rod and W found ones, the lower of each pair first.
-    RINGLET_INLINE Closest closest(int place, const int *found, Mask<float> second) const {
-        const Points c = sorted_.every(0, place), h = sorted_.every(1, place);
-        const Points c_other = sorted_.pick(0, found), h_other = sorted_.pick(1, found);
+    /// Whether the own rod of a pair is the second one: both sides of it must compute the same.
+    static RINGLET_INLINE Mask<float> is_second(const int *own, const int *other) {
+        Mask<float> a, b;
+        __builtin_memcpy(&a, own, sizeof a);
+        __builtin_memcpy(&b, other, sizeof b);
+        return b < a;
+    }
+
+    RINGLET_INLINE Closest closest(const int *own, const int *other) const {
+        const Mask<float> second = is_second(own, other);
+        const Points c = sorted_.pick(0, own), h = sorted_.pick(1, own);
+        const Points c_other = sorted_.pick(0, other), h_other = sorted_.pick(1, other);
         return {select(second, c_other, c), select(second, h_other, h), select(second, c, c_other),
                 select(second, h, h_other)};
     }
 
-    /// Adds the contacts with the first `count` of W found rods.
-    void meet(int place, const int *found, int count, Sums &sums) const {
-        const int rod = order_[place];
-        Mask<float> second, mine; // this rod is the second of the pair; lanes that are in use
-        for (int lane = 0; lane < W; ++lane) {
-            second[lane] = order_[found[lane]] < rod ? -1 : 0;
-            mine[lane] = lane < count ? -1 : 0;
-        }
-        const Closest at = closest(place, found, second);
-        const Floats square = dot(at.gap, at.gap);
-        mine &= square < law_.reach * law_.reach;
-        if (!any<float>(mine)) return;
-        const RodForce force = touch(place, found, second, mine, at, square);
-        const Floats sign = select<float>(second, splat(-1.0f), splat(1.0f));
-        const Floats mine_at = select<float>(second, at.t, at.s);
-        const Floats along = select<float>(mine, force.along, splat(0.0f));
-        const Floats across = select<float>(mine, force.normal, splat(0.0f)) - along;
-        const Points f = select(mine, sign * force.force, Points{}), n = force.n;
-        const Floats values[9] = {f.x, f.y, f.z, along + across * n.x * n.x, across * n.x * n.y, across * n.x * n.z,
-                                  along + across * n.y * n.y, across * n.y * n.z, along + across * n.z * n.z};
+    /// The force between the rods of W pairs, and its load on the own one.
+    void meet(const Nearby &nearby, int at) {
+        const Pairs pairs(nearby, at);
+        const Mask<float> second = is_second(pairs.own, pairs.other);
+        const Closest near = closest(pairs.own, pairs.other);
+        const RodForce force = touch(pairs, second, near);
+        const Points f = select<float>(second, splat(-1.0f), splat(1.0f)) * force.force, n = force.n;
+        const Floats along = force.along, across = force.normal - along;
+        const Floats upper = 0.5f * (1 + select<float>(second, near.t, near.s));
+        const Floats load[9] = {f.x, f.y, f.z, along + across * n.x * n.x, across * n.x * n.y, across * n.x * n.z,
+                                along + across * n.y * n.y, across * n.y * n.z, along + across * n.z * n.z};
+        for (int lane = 0; lane < std::min(W, nearby.near_count - at); ++lane)
+            if (force.normal[lane] > 0) add_load(order_[pairs.own[lane]], load, upper, lane);
+    }
+
+    RINGLET_INLINE void add_load(int rod, const Floats (&load)[9], const Floats &upper, int lane) {
+        RodLoad &sum = loads_[rod];
+        if (!touched_[rod]) sum = {};
+        touched_[rod] = 1;
+        const float part = upper[lane];
         for (int k = 0; k < 9; ++k) {
-            sums.at[0][k] += 0.5f * (1 - mine_at) * values[k];
-            sums.at[1][k] += 0.5f * (1 + mine_at) * values[k];
+            const float high = part * load[k][lane];
+            sum.at[0][k] += load[k][lane] - high;
+            sum.at[1][k] += high;
         }
-        sums.any = true;
     }
 
     /// The force on the first rod of each pair.
-    RINGLET_INLINE RodForce touch(int place, const int *found, Mask<float> second, Mask<float> near, const Closest &at,
-                                  Floats square) const {
-        const int strand = strand_[place];
-        Floats allowed = splat(law_.reach);
-        for (uint32_t bits = set_lanes<float>(near); bits; bits &= bits - 1) {
-            const int lane = __builtin_ctz(bits);
-            allowed[lane] = allowed_.of(strand, strand_[found[lane]], law_.reach);
-        }
-        const Points v = sorted_.every(2, place), g = sorted_.every(3, place);
-        const Points v_other = sorted_.pick(2, found), g_other = sorted_.pick(3, found);
-        const Points u1 = select(second, v_other, v) + at.s * select(second, g_other, g);
-        const Points u2 = select(second, v, v_other) + at.t * select(second, g, g_other);
-        return {law_, at.gap, square_root<float>(maximum<float>(square, splat(1e-16f))), allowed, u1 - u2};
+    RINGLET_INLINE RodForce touch(const Pairs &pairs, Mask<float> second, const Closest &near) const {
+        Floats allowed;
+        for (int lane = 0; lane < W; ++lane)
+            allowed[lane] = allowed_.of(strand_[pairs.own[lane]], strand_[pairs.other[lane]], law_.reach);
+        const Points v = sorted_.pick(2, pairs.own), g = sorted_.pick(3, pairs.own);
+        const Points v_other = sorted_.pick(2, pairs.other), g_other = sorted_.pick(3, pairs.other);
+        const Points u1 = select(second, v_other, v) + near.s * select(second, g_other, g);
+        const Points u2 = select(second, v, v_other) + near.t * select(second, g, g_other);
+        const Floats square = maximum<float>(dot(near.gap, near.gap), splat(1e-16f));
+        return {law_, near.gap, square_root<float>(square), allowed, u1 - u2};
     }
 };
 
