@@ -382,6 +382,30 @@ def advance(
 
     """
 
+class HairCapsules(Neighbours):
+    """Every segment a soft rod: rods of different strands push each other apart and rub.
+
+    Two strands that come nearer than 2 `radius` to each other at rest may come as near anywhere. A pair of segments
+    has the force of its closest points; forces of both sides are opposite to rounding.
+    """
+
+    def __init__(
+        self, rest: RestShape, radius: float, stiffness: float, friction: float, speed: float
+    ) -> None:
+        """Measures how near strands come to each other at rest.
+
+        Args:
+            rest: the strands.
+            radius: [m] of the rods.
+            stiffness: [N/m] force of a pair of segments per depth.
+            friction: Coulomb's coefficient.
+            speed: [m/s] rods are not pushed apart faster than this.
+
+        Raises:
+            ValueError: a value outside its range.
+
+        """
+
 def neighbour_acceleration(
     state: State, rest: RestShape, neighbours: Neighbours, head: _F64, settings: StepSettings
 ) -> _F64:

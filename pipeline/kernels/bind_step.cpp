@@ -105,7 +105,7 @@ static Report advance_as(const State &state, const RestShape &rest, const Distan
                          const StepSettings &settings, const Neighbours *neighbours) {
     if (!neighbours) return advance(state.arrays<Real>(), rest, field, drive, settings, threads());
     Together<Real> strands(state.arrays<Real>(), rest, drive, settings);
-    return strands.advance(field, *neighbours->start(Real()), threads());
+    return strands.advance(field, *neighbours->start(Real(), settings.theta * settings.dt), threads());
 }
 
 static Report advance_state(State &state, const RestShape &rest, const DistanceField *field, const Drive &drive,
@@ -130,7 +130,7 @@ template <class Real>
 static Doubles neighbour_acceleration_as(const State &state, const RestShape &rest, const Neighbours &neighbours,
                                          const Pose &head, double theta_dt) {
     auto values = new_array<double>({state.S(), state.P(), size_t(3)});
-    neighbour_acceleration(state.arrays<Real>(), rest, *neighbours.start(Real()), head, theta_dt, values.data(),
+    neighbour_acceleration(state.arrays<Real>(), rest, *neighbours.start(Real(), theta_dt), head, values.data(),
                            threads());
     return values;
 }

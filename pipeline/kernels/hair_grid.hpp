@@ -90,8 +90,8 @@ class HairGrid final : public Neighbours {
     }
 
     bool fits(int strands, int points) const override { return strands == S && points == P; }
-    std::unique_ptr<NeighbourForce<float>> start(float) const override;
-    std::unique_ptr<NeighbourForce<double>> start(double) const override;
+    std::unique_ptr<NeighbourForce<float>> start(float, double) const override;
+    std::unique_ptr<NeighbourForce<double>> start(double, double) const override;
 
   private:
     void measure_groom(const RestShape &rest, const Box &box) {
@@ -135,7 +135,7 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
         place(block, number, Rigid<Real>(head.inverse()));
     }
 
-    void look(const std::vector<Resident<Real>> &blocks, const Pose &head, double) override {
+    void look(const std::vector<Resident<Real>> &blocks, const Pose &head) override {
 #pragma omp single
         {
             turn_ = Rigid<Real>(head);
@@ -224,7 +224,7 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
     /// Places of a block's points; those of no strand, lost or out of all reach take no part.
     void place(const Resident<Real> &resident, int number, const Rigid<Real> &local) {
         const L per_cell = splat(Real(1 / settings_.cell)), far = splat(Real(1e9));
-        const Vec3<Real> lowest = broadcast(grid_.lowest), highest = broadcast(grid_.highest);
+        const Vec3<Real> lowest = broadcast<Real>(grid_.lowest), highest = broadcast<Real>(grid_.highest);
         const int P = resident.block.P;
         M own{};
         for (int lane = 0; lane < resident.index.count; ++lane) own[lane] = -1;
@@ -241,10 +241,6 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
         }
         ranges_[number] = {{smallest<Real>(low.x), smallest<Real>(low.y), smallest<Real>(low.z)},
                            {largest<Real>(high.x), largest<Real>(high.y), largest<Real>(high.z)}};
-    }
-
-    static Vec3<Real> broadcast(const double (&a)[3]) {
-        return {splat(Real(a[0])), splat(Real(a[1])), splat(Real(a[2]))};
     }
 
     /// A box around all places; the last one as long as it holds them and is not much too large.
@@ -353,10 +349,10 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
     }
 };
 
-inline std::unique_ptr<NeighbourForce<float>> HairGrid::start(float) const {
+inline std::unique_ptr<NeighbourForce<float>> HairGrid::start(float, double) const {
     return std::make_unique<GridForce<float>>(*this);
 }
-inline std::unique_ptr<NeighbourForce<double>> HairGrid::start(double) const {
+inline std::unique_ptr<NeighbourForce<double>> HairGrid::start(double, double) const {
     return std::make_unique<GridForce<double>>(*this);
 }
 

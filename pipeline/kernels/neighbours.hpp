@@ -60,7 +60,7 @@ template <class Real> class NeighbourForce {
     virtual void see(const Resident<Real> &block, int number, const Pose &head) = 0;
 
     /// Works out what all strands do, at the same pose. Called by every thread of a parallel region, which share it.
-    virtual void look(const std::vector<Resident<Real>> &blocks, const Pose &head, double theta_dt) = 0;
+    virtual void look(const std::vector<Resident<Real>> &blocks, const Pose &head) = 0;
 
     /// Writes the force on a block. Blocks may come in any order and thread.
     virtual void act(Resident<Real> &block, int number) = 0;
@@ -71,8 +71,10 @@ class Neighbours {
   public:
     virtual ~Neighbours() = default;
     virtual bool fits(int S, int P) const = 0;
-    virtual std::unique_ptr<NeighbourForce<float>> start(float) const = 0;
-    virtual std::unique_ptr<NeighbourForce<double>> start(double) const = 0;
+
+    /// The method at work, for steps of theta_dt [s]; the first argument only tells the precision.
+    virtual std::unique_ptr<NeighbourForce<float>> start(float, double theta_dt) const = 0;
+    virtual std::unique_ptr<NeighbourForce<double>> start(double, double theta_dt) const = 0;
 };
 
 } // namespace ringlet

@@ -48,8 +48,4 @@ template <class Real> struct Interval {
     }
 };
 
-template <class Real> Vec3<Real> broadcast(const double *a) {
-    return {splat(Real(a[0])), splat(Real(a[1])), splat(Real(a[2]))};
-}
-
 } // namespace ringlet

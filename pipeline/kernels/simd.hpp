@@ -100,6 +100,33 @@ template <class Real> RINGLET_INLINE bool any(Mask<Real> mask) {
     return bits != 0;
 }
 
+/// A bit for each lane that is set.
+template <class Real> RINGLET_INLINE uint32_t set_lanes(Mask<Real> mask) {
+#ifdef __AVX512F__
+    if constexpr (sizeof(Real) == 4) return uint32_t(_mm512_cmplt_epi32_mask(__m512i(mask), _mm512_setzero_si512()));
+    else return uint32_t(_mm512_cmplt_epi64_mask(__m512i(mask), _mm512_setzero_si512()));
+#else
+    uint32_t bits = 0;
+    for (int i = 0; i < kLanes<Real>; ++i) bits |= uint32_t(mask[i] != 0) << i;
+    return bits;
+#endif
+}
+
+/// Writes the numbers of the lanes that are set, counted from `first`, one after the other, and how many there are
+/// comes back. All of to[0 .. kLanes - 1] may be written to.
+RINGLET_INLINE int write_set_lanes(Mask<float> mask, int first, int *to) {
+#ifdef __AVX512F__
+    const __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const uint32_t bits = set_lanes<float>(mask);
+    _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(__mmask16(bits), _mm512_add_epi32(lanes, _mm512_set1_epi32(first))));
+    return __builtin_popcount(bits);
+#else
+    int count = 0;
+    for (uint32_t bits = set_lanes<float>(mask); bits; bits &= bits - 1) to[count++] = first + __builtin_ctz(bits);
+    return count;
+#endif
+}
+
 template <class Real> struct Vec3 {
     Lanes<Real> x, y, z;
 
@@ -115,5 +142,9 @@ template <class Real> struct Vec3 {
         return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
     }
 };
+
+template <class Real> Vec3<Real> broadcast(const double *a) {
+    return {splat(Real(a[0])), splat(Real(a[1])), splat(Real(a[2]))};
+}
 
 } // namespace ringlet

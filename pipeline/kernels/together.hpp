@@ -52,7 +52,7 @@ template <class Real> class Together {
             for (int k = 0; k < drive_.steps; ++k) {
                 {
                     const Clock clock(look);
-                    force.look(blocks_, drive_.head[k], settings_.theta * settings_.dt);
+                    force.look(blocks_, drive_.head[k]);
                 }
                 step_blocks(stepper, force, k, acting);
             }
@@ -117,7 +117,7 @@ template <class Real> class Together {
 /// The force of the neighbours alone, over the mass: (S, P, 3) accelerations of a state, for the head at a pose.
 template <class Real, class T>
 void neighbour_acceleration(StateArrays<Real> state, const RestShape &rest, NeighbourForce<Real> &force,
-                            const Pose &head, double theta_dt, T *a, int threads) {
+                            const Pose &head, T *a, int threads) {
     const int blocks = block_count<Real>(rest.S);
     Arena arena(blocks * Resident<Real>::bytes(rest.P));
     std::vector<Resident<Real>> residents;
@@ -129,7 +129,7 @@ void neighbour_acceleration(StateArrays<Real> state, const RestShape &rest, Neig
     }
 #pragma omp parallel num_threads(threads)
     {
-        force.look(residents, head, theta_dt);
+        force.look(residents, head);
 #pragma omp for
         for (int b = 0; b < blocks; ++b) {
             Resident<Real> &resident = residents[b];

@@ -26,6 +26,8 @@ def neighbours(
             raise InputError(
                 f"simulate.hair_contact.cell = {contact.cell * 1e3:g} mm: {error}; make it larger"
             ) from error
+    if contact.method == "capsule":
+        return kernels.HairCapsules(rest, contact.radius, contact.stiffness, contact.friction, contact.speed)
     return None
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from pipeline.config.schema.base import Section
-from pipeline.config.units import Acceleration, Density, Length, Rate
+from pipeline.config.units import Acceleration, Density, Length, Rate, Speed
 
 
 class HairContact(Section):
@@ -20,10 +20,12 @@ class HairContact(Section):
     drag: Annotated[Rate, Field(ge=0)] = 3.0
     """Grid: the rate at which a guide takes on the velocity of the hair around it."""
     radius: Annotated[Length, Field(gt=0)] = 1.5e-3
-    """Capsule: radius of the wisp that a guide stands for; guides that are groomed nearer stay as near."""
+    """Capsule: radius of the wisp that a guide stands for; two guides that are groomed nearer may stay as near."""
     stiffness: Annotated[float, Field(ge=0)] = 0.005
     """Capsule: force per depth of two wisps in each other [N/m]."""
     friction: Annotated[float, Field(ge=0, le=2)] = 0.3
     """Capsule: Coulomb friction between wisps."""
     limit: Annotated[Acceleration, Field(gt=0)] = 50.0
-    """Largest acceleration by which a neighbour pushes: hair that starts too dense comes out slowly."""
+    """Grid: largest push; hair that starts too dense comes out slowly."""
+    speed: Annotated[Speed, Field(gt=0)] = 0.2
+    """Capsule: wisps are pushed apart no faster than this; those that start in each other come out slowly."""
