@@ -31,11 +31,13 @@ class BodyFrames:
     @cached_property
     def grid(self) -> Grid:
         """One grid around the skins of all frames."""
-        return Grid.around(np.stack([self.points.min(axis=(0, 1)), self.points.max(axis=(0, 1))]), self.spacing)
+        return Grid.around(
+            np.stack([self.points.min(axis=(0, 1)), self.points.max(axis=(0, 1))]), self.spacing
+        )
 
     def skin(self, index: int) -> NDArray[np.float32]:
         """Points (V, 3) [m] of a frame, counted from 0."""
-        return self.points[min(max(index, 0), len(self) - 1)]
+        return np.asarray(self.points[min(max(index, 0), len(self) - 1)])
 
     def distance(self, index: int) -> kernels.MeshDistance:
         """Distance to the skin of a frame, counted from 0."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.config.schema import Config
 from pipeline.errors import InputError
 from pipeline.groom.head import scalp
-from pipeline.groom.head_field import Field
+from pipeline.groom.head_field import Field, distance_grid
 
 Points = NDArray[np.floating[Any]]
 Feet = Callable[[Points], tuple[Points, Points]]
@@ -84,7 +84,6 @@ def make_head(config: Config) -> Head | None:
 
 def _mannequin(spacing: float, tone: str) -> Head:
     from pipeline.groom.head import distance, skin, surface
-    from pipeline.groom.mesh_distance import distance_grid
 
     points, triangles, normals = surface.contour()
     return Head(
@@ -100,7 +99,6 @@ def _from_mesh(config: Config) -> Head:
     from pipeline.groom.head.skin import srgb_to_linear
     from pipeline.groom.head.table import load_table
     from pipeline.groom.head_mesh import load_mesh, point_normals
-    from pipeline.groom.mesh_distance import distance_grid
 
     scene = config.scene
     points, triangles = load_mesh(Path(scene.head), scene.unit_scale, scene.up_axis)

@@ -31,6 +31,8 @@ class Camera(Section):
 class Scene(Section):
     head: str = "builtin"
     """"builtin" (the mannequin), "none" (strands alone) or the path of a closed mesh, relative to the config."""
+    body: str | None = None
+    """The head in motion: a mesh a frame with the points and faces of `head`, as a pattern ("body.%04d.obj", "body.####.ply") or a folder of numbered files, relative to the config; the first is frame 1, the last is held."""
     unit_scale: Annotated[float, Field(gt=0)] = 1.0
     """Metres per unit of the head's mesh file (0.01 for centimetres)."""
     up_axis: Literal["x", "y", "z"] = "y"
