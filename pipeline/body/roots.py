@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.body.distance import Grid
+from pipeline.body.normals import point_normals
 
 Vectors = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -73,13 +74,8 @@ class SkinRoots:
         return np.asarray(u @ vt)
 
     def _corner_normals(self, points: Vectors) -> Vectors:
-        """Unit normals (K, 3) at the points that are needed: the mean of the faces around them, by area."""
-        p = points[self._triangles]
-        area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-        corners = self._triangles.ravel()
-        sums = [np.bincount(corners, np.repeat(part, 3), len(points)) for part in area.T]
-        normals = np.stack(sums, axis=1)[self._points]
-        return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+        """Unit normals (K, 3) at the points that are needed."""
+        return point_normals(points, self._triangles)[self._points]
 
 
 def _edges_of(triangles: Indices, points: Indices) -> tuple[Indices, Indices, Indices]:

@@ -37,10 +37,6 @@ def body_frames(config: Config, head: Head) -> Iterator[BodyFrame]:
     scene = config.scene
     if scene.body is None:
         return
-    if scene.head == "builtin":
-        raise InputError(
-            "scene.body: needs a mesh of the rest pose with the same points; set scene.head to its path"
-        )
     skull = head.skin.points[:, 1] > head.skin.points[:, 1].max() - _SKULL * head.scale
     files = numbered_files(Path(scene.body))
     for path, points in zip(

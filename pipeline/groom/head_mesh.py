@@ -55,27 +55,18 @@ def load_poses(
 
     Raises InputError for what `load_mesh` refuses in a file, and for points or faces that are not those of the head.
     """
-    raw, faces = _checked(head, *next(_read_apart([head])))
+    meshes = zip([head, *files], _read_apart([head, *files]), strict=True)
+    path, mesh = next(meshes)
+    raw, faces = _checked(path, *mesh)
     kept = _welded(raw, faces)[2]
-    for path, (points, own) in zip(files, _read_apart(files), strict=True):
-        points, own = _checked(path, points, own)
+    for path, mesh in meshes:
+        points, own = _checked(path, *mesh)
         if len(points) != len(raw) or not np.array_equal(own, faces):
             raise InputError(
                 f"{path}: {len(points)} points and {len(own)} triangles that are not the {len(raw)} and {len(faces)} "
                 f"of {head.name}; export all frames from one mesh, without reordering points"
             )
         yield upright(points[kept] * unit_scale, up_axis).astype(np.float32)
-
-
-def point_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Unit outward normals (V, 3), the mean of the faces around a point weighted by area."""
-    p = points.astype(np.float64)[triangles]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normals = np.stack(
-        [np.bincount(triangles.ravel(), np.repeat(area[:, k], 3), len(points)) for k in range(3)], axis=1
-    )
-    length = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    return np.asarray(normals / length, np.float32)
 
 
 def zero_surface(values: NDArray[Any]) -> tuple[Points, NDArray[np.int32]]:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.config.schema.base import Colour, Position, Section, Vector
 from pipeline.config.units import Angle
@@ -51,3 +51,11 @@ class Scene(Section):
     """Directional lights: key, fill and rim by default."""
     camera: Camera = Camera()
     """The camera."""
+
+    @model_validator(mode="after")
+    def _body_fits_head(self) -> "Scene":
+        if self.body is not None and self.head in ("builtin", "none"):
+            raise ValueError(
+                "body needs a head in its rest pose with the same points; set scene.head to its mesh"
+            )
+        return self
