@@ -3,6 +3,7 @@
 import numpy as np
 
 from pipeline import kernels
+from pipeline.body.frames import BodyFrames
 from pipeline.cache.store import Reader
 from pipeline.config import Config
 from pipeline.strands.expand import Binding, Expansion, Style
@@ -33,3 +34,16 @@ def distance_field(groom: Reader) -> kernels.DistanceField | None:
         return None
     values, origin = groom["head/distance"][:], groom["head/origin"][:]
     return kernels.DistanceField(values, np.asarray(origin, np.float64), float(groom["head/spacing"][0]))
+
+
+def body_frames(groom: Reader) -> BodyFrames | None:
+    """The head in motion of groom.h5; None where it is rigid."""
+    if "body/points" not in groom:
+        return None
+    return BodyFrames(
+        rest=groom["head/points"][:],
+        triangles=groom["head/triangles"][:],
+        points=groom["body/points"][:],
+        poses=groom["body/pose"][:],
+        spacing=float(groom["head/spacing"][0]),
+    )

@@ -61,7 +61,7 @@ def _stamp(experiment: Experiment, stage: str) -> Path:
 
 def _sources(loaded: Loaded) -> list[Path]:
     """List the config, what it extends and the files that it names."""
-    return [*loaded.files, *named_files(loaded.config).values()]
+    return [*loaded.files, *(path for paths in named_files(loaded.config).values() for path in paths)]
 
 
 def _write(path: Path, text: str) -> None:

@@ -22,6 +22,7 @@ _READS: dict[str, tuple[str, ...]] = {
     "groom": (
         "seed",
         "scene.head",
+        "scene.body",
         "scene.unit_scale",
         "scene.up_axis",
         "scene.skin",
@@ -48,7 +49,7 @@ _UPSTREAM: dict[str, tuple[str, ...]] = {
     "render": ("groom", "simulate", "interpolate"),
 }
 _NOT_SOURCES = (".pyc", ".pyi", ".so")
-_SHARED_CODE = ("kernels", "strands", "cache")
+_SHARED_CODE = ("kernels", "strands", "body", "cache")
 
 
 def stage_keys(config: Config) -> dict[str, str]:
@@ -59,8 +60,8 @@ def stage_keys(config: Config) -> dict[str, str]:
 def stage_inputs(config: Config) -> dict[str, Inputs]:
     """What goes into each key, flat: {"scene.lights[0].irradiance": 4.0, ..., "stage groom": its key}."""
     values = config.model_dump(mode="json")
-    for key, path in named_files(config).items():
-        _stand_in(values, key, path)
+    for key, paths in named_files(config).items():
+        _stand_in(values, key, paths)
     flat = _flat(values, ())
     stages: dict[str, Inputs] = {}
     for stage in STAGES:
@@ -116,18 +117,25 @@ def file_digest(path: Path) -> str:
     return _file_digest(path, status.st_size, status.st_mtime_ns)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=4096)
 def _file_digest(path: Path, size: int, time: int) -> str:  # noqa: ARG001, they are the memory's key
     with path.open("rb") as file:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=8)).hexdigest()
 
 
-def _stand_in(values: dict[str, Any], key: tuple[str, ...], path: Path) -> None:
+def _stand_in(values: dict[str, Any], key: tuple[str, ...], paths: tuple[Path, ...]) -> None:
     """Put a file's content in place of its path: moving it changes nothing, editing it does."""
     table = values
     for name in key[:-1]:
         table = table[name]
-    table[key[-1]] = f"{path.name} ({file_digest(path)})"
+    digests = [file_digest(path) for path in paths]
+    more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+    content = (
+        digests[0]
+        if len(paths) == 1
+        else hashlib.blake2b("".join(digests).encode(), digest_size=8).hexdigest()
+    )
+    table[key[-1]] = f"{paths[0].name}{more} ({content})"
 
 
 def _flat(value: Any, path: KeyPath) -> Inputs:

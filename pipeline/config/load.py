@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from pipeline.config.complaints import complaints
 from pipeline.config.schema import Config
+from pipeline.config.sequence import numbered_files
 from pipeline.config.toml_lines import key_lines
 from pipeline.config.tree import KeyPath, Tree, dotted, parse_key
 from pipeline.errors import InputError
@@ -24,6 +25,8 @@ FILES: dict[tuple[str, ...], tuple[str, ...]] = {  # keys that name a file, and 
     ("simulate", "motion", "file"): (),
     ("simulate", "tips_file"): (),
 }
+
+SEQUENCES: tuple[tuple[str, ...], ...] = (("scene", "body"),)  # keys that name numbered files
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ def load(path: Path, overrides: tuple[str, ...] = ()) -> Loaded:
     for override in overrides:
         _override(tree, override)
     missing = [message for key, words in FILES.items() if (message := _resolve(tree, key, words))]
+    missing += [message for key in SEQUENCES if (message := _resolve_sequence(tree, key))]
     try:
         config = Config.model_validate_json(json.dumps(tree.values, default=str), strict=True)
     except ValidationError as error:
@@ -56,15 +60,15 @@ def load(path: Path, overrides: tuple[str, ...] = ()) -> Loaded:
     return Loaded(config, origins, tuple(files))
 
 
-def named_files(config: Config) -> dict[tuple[str, ...], Path]:
-    """The files that a config names, by key."""
-    found = {}
-    for key, words in FILES.items():
+def named_files(config: Config) -> dict[tuple[str, ...], tuple[Path, ...]]:
+    """The files that a config names, by key. Raises InputError for a sequence with gaps."""
+    found: dict[tuple[str, ...], tuple[Path, ...]] = {}
+    for key in (*FILES, *SEQUENCES):
         value: Any = config
         for name in key:
             value = getattr(value, name)
-        if value is not None and value not in words:
-            found[key] = Path(value)
+        if value is not None and value not in FILES.get(key, ()):
+            found[key] = numbered_files(Path(value)) if key in SEQUENCES else (Path(value),)
     return found
 
 
@@ -81,7 +85,7 @@ def _read(path: Path, files: list[Path]) -> Tree:
     lines = {key: f"{path}:{line}" for key, line in key_lines(text).items()}
     values.setdefault("name", path.stem)
     own = Tree(values, lines)
-    own.anchor = dict.fromkeys(FILES, path.parent)
+    own.anchor = dict.fromkeys((*FILES, *SEQUENCES), path.parent)
     parent = values.pop("extends", None)
     if parent is None:
         return own
@@ -126,7 +130,7 @@ def _override(tree: Tree, override: str) -> None:
         tree.set(path, _scalar(value.strip()), f"-s {dotted(path)}", _defaults)
     except LookupError as error:
         raise InputError(f"-s {key.strip()}: {error.args[0]}") from None
-    if path in FILES:
+    if path in FILES or path in SEQUENCES:
         tree.anchor[path] = Path.cwd()
 
 
@@ -158,3 +162,17 @@ def _resolve(tree: Tree, key: KeyPath, words: tuple[str, ...]) -> str | None:
     listed = ", ".join(f'"{word}"' for word in words)
     remedy = f"give a file or one of {listed}" if words else "check its path, which is relative to the config"
     return f"{tree.label(key)}: no such file: {file}; {remedy}"
+
+
+def _resolve_sequence(tree: Tree, key: KeyPath) -> str | None:
+    """Make the pattern of a sequence absolute; return what is wrong with its files."""
+    value = tree.get(key)
+    if not isinstance(value, str):
+        return None
+    pattern = tree.anchor[key].resolve() / Path(value).expanduser()
+    tree.replace(key, str(pattern))
+    try:
+        numbered_files(pattern)
+    except InputError as error:
+        return f"{tree.label(key)}: {error}"
+    return None

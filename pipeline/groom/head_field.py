@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
+from pipeline.body.distance import Grid
 
 Points = NDArray[np.floating[Any]]
 Vectors = NDArray[np.float64]
@@ -65,3 +66,9 @@ class Field:
         h = np.maximum(_GUARD_BLEND - np.abs(self.values - guard), 0) / _GUARD_BLEND
         joined = np.minimum(self.values, guard) - _GUARD_BLEND / 6 * h**3
         return Field(np.ascontiguousarray(joined, np.float32), self.origin, self.spacing)
+
+
+def distance_grid(points: Points, triangles: NDArray[np.integer], spacing: float) -> Field:
+    """Signed distance on a grid around the mesh; `points` (V, 3) [m], `triangles` (T, 3) closed, wound outwards."""
+    grid = Grid.around(points, spacing)
+    return Field(grid.measure(points, triangles).values, grid.origin, spacing)

@@ -9,6 +9,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ Faces = NDArray[np.int64]
 # What a reader may take, and more for each byte of the file: damaged files ask for anything, or never end.
 _MEMORY, _MEMORY_A_BYTE = 4 << 30, 200  # [bytes]
 _SECONDS, _SECONDS_A_BYTE = 10, 2e-6  # [s] of processor time
+_FILES_AT_A_TIME = 64
 _SAME = 1e-6  # of the mesh's size: points this near are one
 _FLAT = 1e-9  # of the size cubed: less is no volume
 
@@ -36,19 +38,8 @@ def load_mesh(
     `unit_scale` is metres per unit of the file. Raises InputError for a missing or unreadable file, points that are
     not finite, indices out of range, a mesh without triangles, and a mesh with holes or with edges of three faces.
     """
-    if not path.is_file():
-        raise InputError(f'{path}: no such mesh; scene.head takes a path, "builtin" or "none"')
-    if path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty; export the mesh again")
-    points, faces = _read_apart(path)
-    if len(faces) == 0:
-        raise InputError(f"{path}: no faces; scene.head needs a surface")
-    if faces.min() < 0 or faces.max() >= len(points):
-        raise InputError(f"{path}: a face names a point that is not among the {len(points)}; export it again")
-    if not np.isfinite(points).all():
-        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise InputError(f"{path}: point {bad} is not finite; repair the mesh")
-    points, faces = _welded(points, faces)
+    given, faces = next(_read_apart([path]))
+    points, faces, _ = _welded(*_checked(path, given, faces))
     _require_closed(path, faces)
     faces = _wound_outwards(points, faces)
     if len(faces) == 0 or _volumes(points, faces).sum() < _FLAT * np.ptp(points, axis=0).max() ** 3:
@@ -57,15 +48,25 @@ def load_mesh(
     return points.astype(np.float32), np.ascontiguousarray(faces, np.int32)
 
 
-def point_normals(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Unit outward normals (V, 3), the mean of the faces around a point weighted by area."""
-    p = points.astype(np.float64)[triangles]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normals = np.stack(
-        [np.bincount(triangles.ravel(), np.repeat(area[:, k], 3), len(points)) for k in range(3)], axis=1
-    )
-    length = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    return np.asarray(normals / length, np.float32)
+def load_poses(
+    head: Path, files: Sequence[Path], unit_scale: float = 1.0, up_axis: str = "y"
+) -> Iterator[NDArray[np.float32]]:
+    """Points (V, 3) float32 [m] of each file, in the order that `load_mesh` gives those of `head`.
+
+    Raises InputError for what `load_mesh` refuses in a file, and for points or faces that are not those of the head.
+    """
+    meshes = zip([head, *files], _read_apart([head, *files]), strict=True)
+    path, mesh = next(meshes)
+    raw, faces = _checked(path, *mesh)
+    kept = _welded(raw, faces)[2]
+    for path, mesh in meshes:
+        points, own = _checked(path, *mesh)
+        if len(points) != len(raw) or not np.array_equal(own, faces):
+            raise InputError(
+                f"{path}: {len(points)} points and {len(own)} triangles that are not the {len(raw)} and {len(faces)} "
+                f"of {head.name}; export all frames from one mesh, without reordering points"
+            )
+        yield upright(points[kept] * unit_scale, up_axis).astype(np.float32)
 
 
 def zero_surface(values: NDArray[Any]) -> tuple[Points, NDArray[np.int32]]:
@@ -79,17 +80,44 @@ def zero_surface(values: NDArray[Any]) -> tuple[Points, NDArray[np.int32]]:
     return np.asarray(found.points, float), np.ascontiguousarray(found.regular_faces[:, ::-1], np.int32)
 
 
-def _read_apart(path: Path) -> tuple[Points, Faces]:
-    with tempfile.TemporaryDirectory() as folder:
-        found = Path(folder) / "mesh.npz"
-        command = [sys.executable, "-m", "pipeline.groom.head_mesh", str(path.absolute()), str(found)]
-        reader = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, check=False)
-        if reader.returncode != 0 or not found.is_file():
-            raise InputError(
-                f"{path}: not a readable mesh; scene.head takes OBJ, PLY, STL, VTP or what meshio reads"
-            )
-        with np.load(found) as arrays:
-            return arrays["points"].astype(np.float64), arrays["faces"].astype(np.int64)
+def _checked(path: Path, points: Points, faces: Faces) -> tuple[Points, Faces]:
+    """The mesh as it was read, with faces of points that exist and are finite."""
+    if len(faces) == 0:
+        raise InputError(f"{path}: no faces; scene.head needs a surface")
+    if faces.min() < 0 or faces.max() >= len(points):
+        raise InputError(f"{path}: a face names a point that is not among the {len(points)}; export it again")
+    if not np.isfinite(points).all():
+        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise InputError(f"{path}: point {bad} is not finite; repair the mesh")
+    return points, faces
+
+
+def _read_apart(paths: Sequence[Path]) -> Iterator[tuple[Points, Faces]]:
+    """Points and triangles of each file, read by another process, many files at a time."""
+    for path in paths:
+        if not path.is_file():
+            raise InputError(f'{path}: no such mesh; scene.head takes a path, "builtin" or "none"')
+        if path.stat().st_size == 0:
+            raise InputError(f"{path}: the file is empty; export the mesh again")
+    for first in range(0, len(paths), _FILES_AT_A_TIME):
+        with tempfile.TemporaryDirectory() as folder:
+            some = paths[first : first + _FILES_AT_A_TIME]
+            command = [
+                sys.executable,
+                "-m",
+                "pipeline.groom.head_mesh",
+                folder,
+                *(str(p.absolute()) for p in some),
+            ]
+            subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, check=False)
+            for index, path in enumerate(some):
+                found = Path(folder) / f"{index}.npz"
+                if not found.is_file():
+                    raise InputError(
+                        f"{path}: not a readable mesh; scene.head takes OBJ, PLY, STL, VTP or what meshio reads"
+                    )
+                with np.load(found) as arrays:
+                    yield arrays["points"].astype(np.float64), arrays["faces"].astype(np.int64)
 
 
 def _read(path: Path) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -133,8 +161,11 @@ def _fans(polygons: NDArray[Any]) -> Faces:
     return np.concatenate([p[:, [0, k, k + 1]] for k in range(1, p.shape[1] - 1)])
 
 
-def _welded(points: Points, faces: Faces) -> tuple[Points, Faces]:
-    """Merge points that lie within a millionth of the mesh's size; drop triangles that collapse and lone points."""
+def _welded(points: Points, faces: Faces) -> tuple[Points, Faces, Faces]:
+    """Merge points that lie within a millionth of the mesh's size; drop triangles that collapse and lone points.
+
+    Returns points, faces, and which of the given points (V,) were kept.
+    """
     low = points[faces.ravel()].min(axis=0)
     cell = max(float((points[faces.ravel()] - low).max()), 1e-300) * _SAME
     used, faces = np.unique(faces, return_inverse=True)
@@ -143,7 +174,7 @@ def _welded(points: Points, faces: Faces) -> tuple[Points, Faces]:
     _, first, merged = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     a, b, c = merged.reshape(-1)[faces.reshape(-1, 3)].T
     kept = (a != b) & (b != c) & (c != a)
-    return points[first], np.stack([a, b, c], axis=1)[kept].astype(np.int64)
+    return points[first], np.stack([a, b, c], axis=1)[kept].astype(np.int64), used[first]
 
 
 def _require_closed(path: Path, faces: Faces) -> None:
@@ -203,15 +234,18 @@ def _volumes(points: Points, faces: Faces) -> NDArray[np.float64]:
     return np.asarray(np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
 
 
-def _main(path: Path, found: Path) -> None:
-    """Read a mesh, whatever it may be, within bounds of memory and time."""
-    size = path.stat().st_size
+def _main(folder: Path, paths: list[Path]) -> None:
+    """Read meshes, whatever they may be, within bounds of memory and time, to folder/0.npz and so on."""
+    size = sum(path.stat().st_size for path in paths)
     memory, seconds = _MEMORY + _MEMORY_A_BYTE * size, int(_SECONDS + _SECONDS_A_BYTE * size)
     for limit, value in (("AS", memory), ("CPU", seconds), ("CORE", 0)):
         resource.setrlimit(getattr(resource, f"RLIMIT_{limit}"), (value, value))
-    points, faces = _read(path)
-    np.savez(found, points=points, faces=faces)
+    for index, path in enumerate(paths):
+        points, faces = _read(path)
+        unfinished = folder / "unfinished.npz"
+        np.savez(unfinished, points=points, faces=faces)
+        unfinished.rename(folder / f"{index}.npz")
 
 
 if __name__ == "__main__":
-    _main(Path(sys.argv[1]), Path(sys.argv[2]))
+    _main(Path(sys.argv[1]), [Path(name) for name in sys.argv[2:]])

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.body.normals import point_normals
 from pipeline.config.schema import Config
 from pipeline.errors import InputError
 from pipeline.groom.head import scalp
-from pipeline.groom.head_field import Field
+from pipeline.groom.head_field import Field, distance_grid
 
 Points = NDArray[np.floating[Any]]
 Feet = Callable[[Points], tuple[Points, Points]]
@@ -84,7 +85,6 @@ def make_head(config: Config) -> Head | None:
 
 def _mannequin(spacing: float, tone: str) -> Head:
     from pipeline.groom.head import distance, skin, surface
-    from pipeline.groom.mesh_distance import distance_grid
 
     points, triangles, normals = surface.contour()
     return Head(
@@ -99,8 +99,7 @@ def _mannequin(spacing: float, tone: str) -> Head:
 def _from_mesh(config: Config) -> Head:
     from pipeline.groom.head.skin import srgb_to_linear
     from pipeline.groom.head.table import load_table
-    from pipeline.groom.head_mesh import load_mesh, point_normals
-    from pipeline.groom.mesh_distance import distance_grid
+    from pipeline.groom.head_mesh import load_mesh
 
     scene = config.scene
     points, triangles = load_mesh(Path(scene.head), scene.unit_scale, scene.up_axis)
@@ -110,7 +109,7 @@ def _from_mesh(config: Config) -> Head:
             f"{scene.head}: {largest:.3g} m from end to end is not the size of a head; "
             "scene.unit_scale is metres per unit of the file (0.01 for centimetres)"
         )
-    normals = point_normals(points, triangles)
+    normals = point_normals(points, triangles).astype(np.float32)
     tone = srgb_to_linear(np.array(load_table()["skin"][scene.skin]))
     field = distance_grid(points, triangles, config.simulate.contact.spacing)
     scale, offset = fit_skull(points)

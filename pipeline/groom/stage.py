@@ -7,6 +7,7 @@ strands/held (S, P) u8             0 free, 1 held by the head, 2 by the hand
 guides/strand (G,) u32             which strands are simulated, ascending
 guides/offset (G, P) f32 [m]       distance that their points keep from the skin
 head/points, triangles, normals, albedo, distance, origin, spacing     unless scene.head = "none"
+body/points (F, V, 3) f32 [m], pose (F, 4, 4)     the head in motion, where there is scene.body (see body.py)
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from pipeline import cache
 from pipeline.config import Config, provenance
+from pipeline.groom.body import BodyFrame, body_frames
 from pipeline.groom.guides import choose_guides, looked_at
 from pipeline.groom.heads import Head, make_head
 from pipeline.groom.procedural import Style
@@ -34,12 +36,13 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
     head = make_head(config)
     chunks, count, report = _source(config, head)
     with cache.create(experiment.groom, "groom", key, provenance(config, "groom")) as writer:
+        if head is not None:
+            _write_head(writer, head)
+            _write_body(writer, body_frames(config, head))
         points, side = _write_strands(writer, chunks, count, looked_at(config.groom.guides))
         chosen = choose_guides(points, side, config.groom.guides)
         writer.write("guides/strand", chosen)
         writer.write("guides/offset", contact_offset(config, head, points[chosen]))
-        if head is not None:
-            _write_head(writer, head)
         writer.meta["report"] = {"strands": count, "guides": len(chosen)} | report
     say("groom", f"{count} strands, {len(chosen)} guides")
 
@@ -128,3 +131,17 @@ def _write_head(writer: cache.Writer, head: Head) -> None:
     writer.write("head/distance", head.field.values)
     writer.write("head/origin", head.field.origin)
     writer.write("head/spacing", np.array([head.field.spacing]))
+
+
+def _write_body(writer: cache.Writer, frames: Iterable[BodyFrame]) -> None:
+    columns: dict[str, cache.columns.ColumnWriter] = {}
+    count = 0
+    for frame in frames:
+        count += 1
+        if not columns:
+            columns["points"] = writer.stream("body/points", frame.points.shape, np.float32, chunk_rows=1)
+            columns["pose"] = writer.stream("body/pose", (4, 4), np.float64)
+        columns["points"].append(frame.points[None])
+        columns["pose"].append(frame.pose[None])
+    if count:
+        say("groom", f"the head moves and deforms over {count} meshes")

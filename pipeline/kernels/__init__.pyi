@@ -490,13 +490,21 @@ class BoundStrands:
 class GuideMotion:
     """How the guides' segments have turned since rest, seen from the head: the rotations that strands inherit."""
 
-    def __init__(self, rest: NDArray[np.float32], points: NDArray[np.float32], pose: _F64) -> None:
+    def __init__(
+        self,
+        rest: NDArray[np.float32],
+        points: NDArray[np.float32],
+        pose: _F64,
+        roots: NDArray[np.float32] | None = None,
+    ) -> None:
         """Rotations of G guides.
 
         Args:
             rest: (G, Q, 3) float32 [m], Q >= 3, in the head's rest frame.
             points: (G, Q, 3) float32 [m], in the world.
             pose: (4, 4) float64, head's rest frame -> world.
+            roots: (N, 3) float32 [m], where a skin that deforms has carried the root of each strand, in the head's
+                rest frame; unset, roots are as at rest.
 
         Raises:
             ValueError: wrong shapes.

@@ -7,11 +7,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace ringlet {
 
 using FloatPoints = Array<const float, -1, -1, 3>;
 using Keys = Array<const uint32_t, -1>;
+using Roots = Array<const float, -1, 3>;
 using Factors = Array<const float, -1>;
 
 /// Python's strands: they hold the caller's arrays.
@@ -46,6 +48,12 @@ static HeldStrands hold(Keys parent, Array<const float, -1, 3> root, Array<const
     return {parent, root, guide, weight, key, scale, phase, greatest(parent.data(), N), greatest(guide.data(), N * k)};
 }
 
+/// Python's moment: how the guides have turned, and where the skin has carried the roots.
+struct Moment {
+    GuideMotion motion;
+    std::optional<Roots> roots;
+};
+
 static GuideMotion make_motion(FloatPoints rest, FloatPoints points, Array<const double, 4, 4> pose) {
     require(rest.shape(0) == points.shape(0) && rest.shape(1) == points.shape(1),
             "GuideMotion: rest and points have different shapes");
@@ -55,7 +63,8 @@ static GuideMotion make_motion(FloatPoints rest, FloatPoints points, Array<const
     return guide_motion(rest.data(), points.data(), int(rest.shape(0)), int(rest.shape(1)), Pose::of(pose.data()), threads());
 }
 
-static nb::ndarray<nb::numpy, float> rotations(const GuideMotion &motion) {
+static nb::ndarray<nb::numpy, float> rotations(const Moment &moment) {
+    const GuideMotion &motion = moment.motion;
     auto array = new_array<float>({size_t(motion.G), size_t(motion.Q - 1), size_t(4)});
     std::copy(motion.rotations.begin(), motion.rotations.end(), array.data());
     return array;
@@ -66,17 +75,20 @@ static ExpandStyle make_style(float skin, float clump, float frizz) {
     return {skin, clump, frizz};
 }
 
-static void expand(FloatPoints rest, const HeldStrands &strands, const GuideMotion &motion, const DistanceField *field,
+static void expand(FloatPoints rest, const HeldStrands &strands, const Moment &moment, const DistanceField *field,
                    const ExpandStyle &style, int64_t begin, Array<float, -1, -1, 3> out) {
+    const GuideMotion &motion = moment.motion;
     const size_t n = out.shape(0), P = rest.shape(1);
     if (n == 0) return;
     require(P >= 2 && out.shape(1) == P, "expand: out and rest have different numbers of points");
     require(begin >= 0 && size_t(begin) + n <= strands.parent.shape(0), "expand: strands beyond the last one");
     require(strands.last_parent < rest.shape(0), "expand: a parent beyond the groom");
     require(strands.last_guide < size_t(motion.G), "expand: a guide beyond the last one");
+    require(!moment.roots || moment.roots->shape(0) == strands.parent.shape(0), "expand: expected a root for each strand");
     nb::gil_scoped_release release;
+    const float *place = moment.roots ? moment.roots->data() : nullptr;
     const BoundStrands bound = strands.view();
-    Expand{rest.data(), int(P), bound, motion, field, style}.run(int(begin), int(n), out.data(), threads());
+    Expand{rest.data(), int(P), bound, motion, field, place, style}.run(int(begin), int(n), out.data(), threads());
 }
 
 void bind_expand(nb::module_ &m) {
@@ -88,12 +100,13 @@ void bind_expand(nb::module_ &m) {
              },
              nb::arg("parent"), nb::arg("root"), nb::arg("guide"), nb::arg("weight"), nb::arg("key"), nb::arg("scale"),
              nb::arg("phase"));
-    nb::class_<GuideMotion>(m, "GuideMotion")
+    nb::class_<Moment>(m, "GuideMotion")
         .def("__init__",
-             [](GuideMotion *self, FloatPoints rest, FloatPoints points, Array<const double, 4, 4> pose) {
-                 new (self) GuideMotion(make_motion(rest, points, pose));
+             [](Moment *self, FloatPoints rest, FloatPoints points, Array<const double, 4, 4> pose,
+                std::optional<Roots> roots) {
+                 new (self) Moment{make_motion(rest, points, pose), roots};
              },
-             nb::arg("rest"), nb::arg("points"), nb::arg("pose"))
+             nb::arg("rest"), nb::arg("points"), nb::arg("pose"), nb::arg("roots") = nb::none())
         .def_prop_ro("rotations", &rotations, nb::rv_policy::automatic);
     nb::class_<ExpandStyle>(m, "ExpandStyle")
         .def("__init__",

@@ -4,6 +4,7 @@
 // w_g weights of the strand's guides, the nearest first; phi distance to the head. Everything happens in the head's
 // rest frame and is carried to the world at the end:
 //     x_0 = root,    x_{j+1} = x_j + R_j e_j,    R_j = normalised sum_g w_g A_g(s_j).
+// Where the skin deforms, x_0 is where it has carried the root, and phi the distance of the moment.
 // A rotation keeps lengths, so a strand has its own length whatever R is, and its rest shape where R is the identity.
 // Source: Hsu et al., "Real-time Physically Guided Hair Interpolation" (ACM TOG 43, 2024) for why positions must not be
 // blended; we blend rotations instead of their forces (tests: error against a rod solver, chunks, lengths).
@@ -177,6 +178,7 @@ struct Expand {
     const BoundStrands &strands;
     const GuideMotion &motion;
     const DistanceField *field; // may be null
+    const float *place;         // (N, 3) roots of the moment; null where they are as at rest
     ExpandStyle style;
 
     /// Points of strands begin .. begin+count to out (count, P, 3).
@@ -205,6 +207,7 @@ struct Expand {
         for (int j = 0; j + 1 < P; ++j) whole += length(e[j]);
         const Lanes<float> spacing = whole * (1.0f / (P - 1));
         const Followed to = followed(strand, spacing);
+        if (place) gather(&root, place, 1, strand);
         x[0] = root;
         if (field) {
             Skin skin(*field, style.skin, root);

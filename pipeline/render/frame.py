@@ -20,7 +20,7 @@ from pipeline.render.geometry import (
 from pipeline.render.lighting import Lighting
 from pipeline.render.target import Target
 from pipeline.render.tone import before_roll_off, develop
-from pipeline.strands.expand import Expansion
+from pipeline.strands.expand import Expansion, MovedSkin
 from pipeline.strands.random import normal
 
 Points = NDArray[np.float32]
@@ -54,6 +54,10 @@ class Moment:
 
     guides: Points
     pose: NDArray[np.float64]
+    skin: Skin | None = None
+    """The head where it is not as at rest, still in its rest frame."""
+    moved: MovedSkin | None = None
+    """Where that skin has carried the roots."""
 
 
 class FrameRenderer:
@@ -85,15 +89,16 @@ class FrameRenderer:
 
     def frame(self, moment: Moment) -> Pixels:
         """Render a moment: sRGB (H, W, 3) uint8."""
-        self.strands.frame(moment.guides, moment.pose)
+        self.strands.frame(moment.guides, moment.pose, moment.moved)
         # Whole margins: the grid of shadows stands still while hair moves a little, so that nothing shimmers
         lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
         upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
         kept = self._light(moment, lower, upper)
         corners = self._corners(moment, lower, upper)
         self.target.clear(self.camera, *self._depths(corners))
-        if self.skin is not None:
-            self._draw_head(self.skin, moment.pose)
+        skin = moment.skin or self.skin
+        if skin is not None:
+            self._draw_head(skin, moment.pose)
         shape, pixels = self.shape(moment)
         wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
         veil = self.lighting.veil(self.eye, wider)
@@ -112,7 +117,8 @@ class FrameRenderer:
             self.lighting.add(points, self._widths(points.shape[0], points.shape[1]))
             if keep:
                 kept.append((first, points))
-        self.lighting.finish(self.skin.field if self.skin else None, moment.pose)
+        skin = moment.skin or self.skin
+        self.lighting.finish(skin.field if skin else None, moment.pose)
         return kept
 
     def _chunks(self, reuse: bool = True) -> Iterator[tuple[int, Points]]:
@@ -161,8 +167,9 @@ class FrameRenderer:
         self, moment: Moment, lower: NDArray[np.float64], upper: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         boxes = [np.array([lower, upper])]
-        if self.skin is not None:
-            box = np.array([self.skin.points.min(axis=0), self.skin.points.max(axis=0)], np.float64)
+        skin = moment.skin or self.skin
+        if skin is not None:
+            box = np.array([skin.points.min(axis=0), skin.points.max(axis=0)], np.float64)
             boxes.append(_box_corners(box) @ moment.pose[:3, :3].T + moment.pose[:3, 3])
         return np.concatenate([_box_corners(boxes[0]), *boxes[1:]])
 

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from pipeline import cache, kernels
-from pipeline.cache.expansion import distance_field, expansion_from
+from pipeline.cache.expansion import body_frames, distance_field, expansion_from
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
+from pipeline.render.body import DrawnBody
 from pipeline.render.frame import FrameRenderer, Moment, Pixels, Skin
 from pipeline.render.target import Target
 
@@ -32,7 +33,8 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
     with cache.open(experiment.groom, "groom") as groom, cache.open(experiment.strands, "strands") as strands:
         expansion = expansion_from(groom, strands, config)
         keys = strands["strands/key"][:]
-        skin = _skin(groom)
+        skin, moving = _skin(groom), body_frames(groom)
+        body = DrawnBody(moving, skin, strands["strands/root"][:]) if moving and skin else None
     renderer = FrameRenderer(config, expansion, keys, skin)
     record = provenance(config, "render")
     texts = {"config": config.name}
@@ -44,6 +46,8 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
     ):
         for number in wanted:
             moment = Moment(guides.frame(number - 1), guides.pose(number - 1))
+            if body is not None:
+                moment = body.at(number - 1, moment)
             name, pixels_wide = renderer.shape(moment)
             if name != shape:
                 say("render", f"strands are {name}, {pixels_wide:.2g} px wide, from frame {number} on")

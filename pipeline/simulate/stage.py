@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import cache
-from pipeline.cache.expansion import distance_field
+from pipeline.cache.expansion import body_frames, distance_field
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.simulate.plots import draw_energies
@@ -60,6 +60,7 @@ def read_guides(experiment: cache.Experiment) -> tuple[Guides, NDArray[np.uint32
             held=groom["strands/held"][strand],
             offset=groom["guides/offset"][:],
             field=distance_field(groom),
+            body=body_frames(groom),
             strands=len(groom["strands/points"]),
         )
     return guides, strand

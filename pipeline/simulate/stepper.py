@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
+from pipeline.body.frames import BodyFrames
 from pipeline.cache import Frame
 from pipeline.config.schema import Simulate
 from pipeline.errors import InputError
@@ -16,6 +17,7 @@ from pipeline.simulate.motion import hand_motion, head_motion
 from pipeline.simulate.rest import rest_shape, settling, step_settings
 from pipeline.simulate.sag_free import Report, hold_groom, wanted
 from pipeline.simulate.screws import Pose, inverse, place
+from pipeline.simulate.skin import MovingSkin
 from pipeline.simulate.wind import wind
 from pipeline.strands.held import HAND
 
@@ -49,6 +51,8 @@ class Guides:
     """(G, P) [m]: distance that points keep from the head."""
     field: kernels.DistanceField | None = None
     """Distance to the head; None without one."""
+    body: BodyFrames | None = None
+    """The head in motion, frame by frame; None where it is rigid."""
     strands: int = 0
     """Strands of the groom that they stand for; 0 for no more than themselves."""
 
@@ -73,6 +77,10 @@ class Simulation:
         self.field = guides.field
         self.settings = step_settings(simulate)
         self.head = head_motion(simulate.motion, simulate.fps)
+        self.skin: MovingSkin | None = None
+        if guides.body is not None:
+            self.skin = MovingSkin(guides.body, guides.points[:, 0], simulate.fps)
+            self.head = self.skin.moved(self.head)
         self.hand = hand_motion(simulate, _middle_of_held(guides))
         each = max(guides.strands, len(guides.points)) / len(guides.points)
         self.neighbours = neighbours(simulate.hair_contact, self.rest, each)
@@ -124,8 +132,14 @@ class Simulation:
         heads = [head(self._time(i)) for i in range(count + 1)]
         hands = [pose @ self.hand(self._time(i)) for i, pose in enumerate(heads)]
         winds = [self.wind(self._time(i + 0.5)) for i in range(count)]
-        drive = kernels.Drive(np.array(heads), np.array(winds), np.array(hands))
-        report = kernels.advance(self.state, self.rest, self.field, drive, settings, self.neighbours)
+        given = np.array(heads), np.array(winds), np.array(hands)
+        if self.skin is None:
+            field, drive = self.field, kernels.Drive(*given)
+        else:
+            substeps = self.simulate.substeps
+            skin = self.skin.during(self.step / substeps, np.arange(count + 1) / substeps)
+            field, drive = skin.field, kernels.Drive(*given, skin.roots, skin.deformation, skin.blend)
+        report = kernels.advance(self.state, self.rest, field, drive, settings, self.neighbours)
         self.cost.add(count, report)
         self.step += count
         self._diagnostics = _summary(report)
@@ -153,8 +167,10 @@ class Simulation:
 
     def _first_state(self, points: NDArray[np.float32]) -> kernels.State:
         pose, precision = self.head(0.0), np.dtype(self.simulate.precision)
-        moved = place(pose, points.astype(np.float64))
-        directors = self.rest.directors @ pose[:3, :3].T
+        each = pose[None] if self.skin is None else pose @ self.skin.root_poses(0)  # of every guide
+        turn = each[:, :3, :3].swapaxes(1, 2)
+        moved = points.astype(np.float64) @ turn + each[:, None, :3, 3]
+        directors = self.rest.directors @ turn
         state = kernels.at_rest(
             np.ascontiguousarray(moved, precision), np.ascontiguousarray(directors, precision)
         )

@@ -54,6 +54,16 @@ class Style:
     """Amplitude [rad] of smooth noise on the directions of a copy's segments."""
 
 
+@dataclass(frozen=True)
+class MovedSkin:
+    """A skin that has moved against the head's rest frame."""
+
+    roots: Points
+    """(N, 3) float32 [m]: where it has carried the root of every strand."""
+    field: kernels.DistanceField
+    """Distance to it."""
+
+
 class Expansion:
     """All strands of one moment, chunk by chunk: `frame` sets the moment, `chunk` gives strands a to b.
 
@@ -97,9 +107,13 @@ class Expansion:
         self._style = kernels.ExpandStyle(style.skin, style.clump, style.frizz)
         self.frame(guide_rest, np.eye(4))
 
-    def frame(self, guide_points: Points, pose: NDArray[np.float64]) -> None:
-        """Go to a moment: guides (G, Q, 3) float32 [m] in the world, pose (4, 4) head's rest frame -> world."""
-        self._motion = kernels.GuideMotion(self._guide_rest, guide_points, pose)
+    def frame(self, guide_points: Points, pose: NDArray[np.float64], skin: "MovedSkin | None" = None) -> None:
+        """Go to a moment: guides (G, Q, 3) float32 [m] in the world, pose (4, 4) head's rest frame -> world.
+
+        `skin` is the head's where it is not as at rest.
+        """
+        self._motion = kernels.GuideMotion(self._guide_rest, guide_points, pose, skin.roots if skin else None)
+        self._moment_field = skin.field if skin else self._field
 
     def chunk(self, a: int, b: int, out: Points | None = None) -> Points:
         """Points of strands a to b, (b-a, P, 3) float32 [m] in the world; written to `out` when it is given.
@@ -112,5 +126,5 @@ class Expansion:
             out = np.empty((b - a, self.points, 3), np.float32)
         if out.shape != (b - a, self.points, 3):
             raise ValueError(f"out has shape {out.shape}, expected {(b - a, self.points, 3)}")
-        kernels.expand(self._rest, self._strands, self._motion, self._field, self._style, a, out)
+        kernels.expand(self._rest, self._strands, self._motion, self._moment_field, self._style, a, out)
         return out

@@ -9,11 +9,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from pipeline.body.normals import point_normals
 from pipeline.config.schema import Config, Contact, Groom, Scene, Simulate
 from pipeline.errors import InputError
-from pipeline.groom.head_mesh import load_mesh, point_normals
+from pipeline.groom.head_field import distance_grid
+from pipeline.groom.head_mesh import load_mesh
 from pipeline.groom.heads import make_head
-from pipeline.groom.mesh_distance import distance_grid
 from pipeline.groom.procedural import Style
 
 SHARED = Path(__file__).parents[2].parent / "shared/data/heads"

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.config.schema.base import Colour, Position, Section, Vector
 from pipeline.config.units import Angle
@@ -31,6 +31,8 @@ class Camera(Section):
 class Scene(Section):
     head: str = "builtin"
     """"builtin" (the mannequin), "none" (strands alone) or the path of a closed mesh, relative to the config."""
+    body: str | None = None
+    """The head in motion: a mesh a frame with the points and faces of `head`, as a pattern ("body.%04d.obj", "body.####.ply") or a folder of numbered files, relative to the config; the first is frame 1, the last is held."""
     unit_scale: Annotated[float, Field(gt=0)] = 1.0
     """Metres per unit of the head's mesh file (0.01 for centimetres)."""
     up_axis: Literal["x", "y", "z"] = "y"
@@ -49,3 +51,11 @@ class Scene(Section):
     """Directional lights: key, fill and rim by default."""
     camera: Camera = Camera()
     """The camera."""
+
+    @model_validator(mode="after")
+    def _body_fits_head(self) -> "Scene":
+        if self.body is not None and self.head in ("builtin", "none"):
+            raise ValueError(
+                "body needs a head in its rest pose with the same points; set scene.head to its mesh"
+            )
+        return self
