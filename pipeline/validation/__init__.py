@@ -4,7 +4,7 @@ Every law runs for every torsion model to which it applies. Planar laws hold for
 bends and twists need material frames, which only "kirchhoff" has: the others are shown with what they do instead.
 """
 
-
+from pipeline.validation import buckling, curls, dynamics, friction, ribbons, statics
 from pipeline.validation.case import Case, CaseResult, Law, Outcome, Reading
 
 __all__ = ["Case", "CaseResult", "Law", "Outcome", "Reading", "all_cases", "all_laws"]
@@ -12,7 +12,7 @@ __all__ = ["Case", "CaseResult", "Law", "Outcome", "Reading", "all_cases", "all_
 
 def all_laws() -> list[Law]:
     """Every law there is."""
-    rooms = ()
+    rooms = (statics, dynamics, friction, buckling, ribbons, curls)
     return [law for room in rooms for law in room.laws()]
 
 

@@ -119,7 +119,7 @@ def energy(model: Model, quick: bool) -> Outcome:
 def spin(model: Model, quick: bool, points: int = 32) -> Outcome:
     """A root that turns about its own direction ten times in a second and stops: what a strand keeps of it.
 
-    A straight strand only rolls; a curl turns with its root and is in its rest shape 2 s after the stop.
+    A straight strand only rolls; a curl turns with its root and is in its rest shape 3 s after the stop.
     """
     length, turns = 0.1, 2.0 if quick else 10.0
     strands = np.concatenate([straight(length, points), helix(0.006, 0.02, length, points)])
@@ -129,16 +129,16 @@ def spin(model: Model, quick: bool, points: int = 32) -> Outcome:
     settings = undamped(model, 1 / 240, 0.6)
     settings.damping, settings.drag = 3e-3, 3.3
     rod = Rod(strands, clamped(points), settings, twisting=(TWISTING if model == "kirchhoff" else 0.0, TWISTING))
-    angles = np.concatenate([2 * np.pi * turns * np.arange(241) / 240, np.full(480, 2 * np.pi * turns)])
+    angles = np.concatenate([2 * np.pi * turns * np.arange(241) / 240, np.full(720, 2 * np.pi * turns)])
     head = np.tile(np.eye(4), (len(angles), 1, 1))
     head[:, 1, 1] = head[:, 2, 2] = np.cos(angles)
     head[:, 2, 1], head[:, 1, 2] = np.sin(angles), -np.sin(angles)
     rod.advance(240, head=head[:241])
     lateral = float(np.abs(rod.state.points[0, :, 1:]).max() / length)
-    rod.advance(480, head=head[240:])
+    rod.advance(720, head=head[240:])
     returned = float(np.abs(rod.state.points[1] - strands[1]).max() / length)
     readings = [Reading("straight, lateral/L while it spins", lateral, 0.0, 1e-9)]
-    readings += [Reading("curl, off its rest shape/L after 2 s", returned, 0.0, 1e-3)]
+    readings += [Reading("curl, off its rest shape/L after 3 s", returned, 0.0, 1e-3)]
     if model == "kirchhoff":
         readings += [Reading("twist left [rad]", float(np.abs(rod.state.twist).max()), 0.0, 1e-2)]
     return Outcome(tuple(readings))
@@ -173,7 +173,7 @@ def laws() -> list[Law]:
         Law(
             "root spin",
             "The root turns about its own direction for a second, twice (quick) or ten times, and stops. A straight "
-            "strand only rolls, a curl is back in its rest shape 2 s later, and no twist is left.",
+            "strand only rolls, a curl is back in its rest shape 3 s later, and no twist is left.",
             spin,
             CURLY,
         ),
