@@ -24,9 +24,13 @@ app.command(bench)
 
 @app.command(group=CHECK_GROUP)
 def validate(
-    case: Annotated[str, Parameter(help="Only cases with this in their name, such as cantilever or rotor.")] = "",
+    case: Annotated[
+        str, Parameter(help="Only cases with this in their name, such as cantilever or rotor.")
+    ] = "",
     *,
-    quick: Annotated[bool, Flag, Parameter(help="Short versions of the cases, in less than a minute.")] = False,
+    quick: Annotated[
+        bool, Flag, Parameter(help="Short versions of the cases, in less than a minute.")
+    ] = False,
     plots: Annotated[Path | None, Parameter(help="Draw pictures into this folder.")] = None,
     page: Annotated[Path | None, Parameter(help="Write a Markdown page with tables and pictures.")] = None,
     json: Json = False,

@@ -72,7 +72,14 @@ def push(model: Model, shortening: float, points: int = 64) -> Array:
         hand[:, 0, 3] = -length * np.linspace(pushed, to, steps + 1)
         rod.advance(steps, hand)
         pushed = to
-        rows.append([(piece + 1) * steps * settings.dt, pushed, _load(rod) * length**2 / BENDING, rod.energy() * length / BENDING])
+        rows.append(
+            [
+                (piece + 1) * steps * settings.dt,
+                pushed,
+                _load(rod) * length**2 / BENDING,
+                rod.energy() * length / BENDING,
+            ]
+        )
     return np.array(rows).T
 
 

@@ -1,10 +1,20 @@
 """Curls under load: where a hanging curl leaves its plane, how far helices stretch."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipeline import kernels
 from pipeline.validation.case import CURLY, Law, Model, Outcome, Reading
-from pipeline.validation.rod import BENDING, GRAVITY, TWISTING, WEIGHT, Array, Rod, clamped, gravito_length, settling
+from pipeline.validation.rod import (
+    BENDING,
+    GRAVITY,
+    Array,
+    Rod,
+    clamped,
+    gravito_length,
+    settling,
+)
 
 # x = Gamma^(1/3) / (kappa_n L) below which a hanging curl leaves its plane, over Gamma, for C/B = 2/3.
 BEND_TWIST = {50: 0.5816, 100: 0.6128, 500: 0.6205, 1000: 0.6205}
@@ -28,7 +38,7 @@ _UNSTABLE = (
 )
 
 
-def hanging(model: Model, figures: list[tuple[float, float]], points: int) -> tuple[Rod, Array]:
+def hanging(model: Model, figures: Sequence[tuple[float, float]], points: int) -> tuple[Rod, Array]:
     """Curls of (Gamma, kappa_n L), clamped downwards, at rest in their plane, z = 0; and their lengths (S,) [m]."""
     rest, start, lengths = [], [], []
     for gamma, turn in figures:
@@ -48,16 +58,16 @@ def _planar(bends: Array, spacing: float) -> Array:
     """A strand (P, 3) [m] that starts downwards from the middle of its segment 0, the origin, and bends in z = 0."""
     angle = np.concatenate([[0.0], np.cumsum(bends)])
     steps = spacing * np.stack([np.sin(angle), -np.cos(angle), 0 * angle], axis=-1)
-    return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]) - steps[0] / 2
+    return np.asarray(np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]) - steps[0] / 2)
 
 
 def _disturb(rod: Rod, size: Array) -> None:
     """Move strands off their plane by up to sizes (S,) [m], evenly more towards their tips; directors stay square."""
     along = np.maximum(np.arange(rod.points.shape[1]) - 1.0, 0) / (rod.points.shape[1] - 2)
-    old = _tangents(rod.state.points)
+    old = _tangents(rod.state.points.astype(np.float64))
     rod.state.points[:, :, 2] += size[:, None] * along**2
     rod.state.velocity[:] = 0
-    new, m = _tangents(rod.state.points), rod.state.directors
+    new, m = _tangents(rod.state.points.astype(np.float64)), rod.state.directors
     shift = (m * new).sum(axis=2, keepdims=True) / (1 + (old * new).sum(axis=2, keepdims=True))
     m[:] = m - shift * (old + new)
 

@@ -27,10 +27,10 @@ OMEGA = {1: 3.516015, 2: 22.034492}
 PENDULUM = {30: 1.017409, 90: 1.180341}
 
 
-def vibration(mode: int, model: Model = "none", points: int = 64) -> tuple[float, Array]:
+def vibration(mode: int, model: Model = "none", steps: int = 400, points: int = 64) -> tuple[float, Array]:
     """Omega = 2 pi f L^2 sqrt(rho A / B) of a small vibration without gravity, and the height of the tip over time.
 
-    The curve (2, T) has time [periods] and height over the first height.
+    The curve (2, T) has time [periods] and height over the first height; a period takes so many steps.
     """
     length = 0.1
     scale = length**2 * np.sqrt(MASS_PER_LENGTH / BENDING)
@@ -42,15 +42,15 @@ def vibration(mode: int, model: Model = "none", points: int = 64) -> tuple[float
     shape = np.cosh(s) - np.cos(s) - sigma * (np.sinh(s) - np.sin(s))
     bent = line.copy()
     bent[0, 2:, 1] = 1e-3 * length * shape[2:] / shape[-1]
-    rod = Rod(line, clamped(points), undamped(model, dt=expected / 400), start=bent)
-    trace = rod.trace(1800, -1, 1)
+    rod = Rod(line, clamped(points), undamped(model, dt=expected / steps), start=bent)
+    trace = rod.trace(9 * steps // 2, -1, 1)
     omega = 2 * np.pi * scale / period(trace, rod.settings.dt)
-    return float(omega), np.stack([np.arange(len(trace)) / 400, trace / trace[0]])
+    return float(omega), np.stack([np.arange(len(trace)) / steps, trace / trace[0]])
 
 
-def vibrations(model: Model, _quick: bool) -> Outcome:
+def vibrations(model: Model, quick: bool) -> Outcome:
     """The first two modes."""
-    found = {mode: vibration(mode, model) for mode in OMEGA}
+    found = {mode: vibration(mode, model, 200 if quick else 400) for mode in OMEGA}
     readings = [Reading(f"Omega_{m}", omega, OMEGA[m], 5e-3) for m, (omega, _) in found.items()]
     return Outcome(tuple(readings), {f"mode {mode}": curve for mode, (_, curve) in found.items()})
 
@@ -128,7 +128,9 @@ def spin(model: Model, quick: bool, points: int = 32) -> Outcome:
     strands[1] = strands[1] @ _turn_to_x(axis / np.linalg.norm(axis)).T
     settings = undamped(model, 1 / 240, 0.6)
     settings.damping, settings.drag = 3e-3, 3.3
-    rod = Rod(strands, clamped(points), settings, twisting=(TWISTING if model == "kirchhoff" else 0.0, TWISTING))
+    rod = Rod(
+        strands, clamped(points), settings, twisting=(TWISTING if model == "kirchhoff" else 0.0, TWISTING)
+    )
     angles = np.concatenate([2 * np.pi * turns * np.arange(241) / 240, np.full(720, 2 * np.pi * turns)])
     head = np.tile(np.eye(4), (len(angles), 1, 1))
     head[:, 1, 1] = head[:, 2, 2] = np.cos(angles)
@@ -147,7 +149,9 @@ def spin(model: Model, quick: bool, points: int = 32) -> Outcome:
 def _turn_to_x(direction: Array) -> Array:
     """The smallest rotation (3, 3) that brings a unit vector to x."""
     x, y, z = direction
-    return np.array([[x, y, z], [-y, 1 - y * y / (1 + x), -y * z / (1 + x)], [-z, -y * z / (1 + x), 1 - z * z / (1 + x)]])
+    return np.array(
+        [[x, y, z], [-y, 1 - y * y / (1 + x), -y * z / (1 + x)], [-z, -y * z / (1 + x), 1 - z * z / (1 + x)]]
+    )
 
 
 def laws() -> list[Law]:

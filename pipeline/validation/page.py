@@ -54,7 +54,9 @@ def summary(results: Sequence[CaseResult]) -> str:
     """How many readings have which verdict; which cases do better than they were said to."""
     counts = Counter(result.verdict(reading) for result in results for reading in result.outcome.readings)
     parts = [f"{counts[verdict]} {verdict}" for verdict in _SIGNS if counts[verdict]]
-    better = [f"{r.name}, {r.model}" for r in results if r.unmet and all(x.passed for x in r.outcome.readings)]
+    better = [
+        f"{r.name}, {r.model}" for r in results if r.unmet and all(x.passed for x in r.outcome.readings)
+    ]
     note = f"; no longer unmet, remove the mark: {'; '.join(better)}" if better else ""
     return f"{len(results)} cases, {sum(counts.values())} figures: {', '.join(parts)}{note}."
 
@@ -83,7 +85,10 @@ def _section(results: Sequence[CaseResult]) -> str:
     for result in results:
         for reading in result.outcome.readings:
             cells = [result.model, reading.what, _number(reading.measured), _number(reading.reference)]
-            cells += [_percent(reading.error, reading.reference), _percent(reading.tolerance, reading.reference)]
+            cells += [
+                _percent(reading.error, reading.reference),
+                _percent(reading.tolerance, reading.reference),
+            ]
             lines.append(f"| {' | '.join(cells)} | {_SIGNS[result.verdict(reading)]} |")
     reasons = [f"* {result.model}: {result.unmet}." for result in results if result.unmet]
     return "\n".join([*lines, *(["", *reasons] if reasons else []), ""])

@@ -13,8 +13,18 @@ from pipeline.validation.case import CaseResult, Model
 from pipeline.validation.curls import BEND_TWIST
 from pipeline.validation.statics import CANTILEVER, TIP_LOAD
 
-COLOURS: dict[Model, str] = {"kirchhoff": "#1b6ca8", "rotor": "#c0392b", "frenet": "#e08e0b", "none": "#5f6a6a"}
-_MARKS: dict[Model, tuple[str, int]] = {"kirchhoff": ("o", 11), "rotor": ("s", 8), "frenet": ("^", 6), "none": (".", 5)}
+COLOURS: dict[Model, str] = {
+    "kirchhoff": "#1b6ca8",
+    "rotor": "#c0392b",
+    "frenet": "#e08e0b",
+    "none": "#5f6a6a",
+}
+_MARKS: dict[Model, tuple[str, int]] = {
+    "kirchhoff": ("o", 11),
+    "rotor": ("s", 8),
+    "frenet": ("^", 6),
+    "none": (".", 5),
+}
 
 
 def need_matplotlib() -> None:
@@ -76,18 +86,33 @@ def _order(figure: Any, results: Sequence[CaseResult]) -> None:
         if name != "points":
             slope = error[-1] * ((points - 1.5) / (points[-1] - 1.5)) ** -2.0
             axes.plot(points, slope, color="black", lw=0.8)
-            axes.annotate(name, (points[-1], error[-1]), xytext=(8, -3), textcoords="offset points", fontsize="small")
+            axes.annotate(
+                name, (points[-1], error[-1]), xytext=(8, -3), textcoords="offset points", fontsize="small"
+            )
     axes.set(xscale="log", yscale="log")
     axes.set_xticks(points, [f"{p:g}" for p in points], minor=False)
     axes.minorticks_off()
-    _legend(axes, xlabel="points", ylabel="error of H/W", title="Cantilever: second order (lines)", xlim=(None, points[-1] * 1.35))
+    _legend(
+        axes,
+        xlabel="points",
+        ylabel="error of H/W",
+        title="Cantilever: second order (lines)",
+        xlim=(None, points[-1] * 1.35),
+    )
 
 
 def _tip_loads(figure: Any, results: Sequence[CaseResult]) -> None:
     axes = figure.add_subplot()
     loads = [*TIP_LOAD]
     for index, what in enumerate(("drop", "reach")):
-        axes.plot(loads, [pair[index] for pair in TIP_LOAD.values()], "x-", color="black", lw=0.8, label="" if index else "elliptic integrals")
+        axes.plot(
+            loads,
+            [pair[index] for pair in TIP_LOAD.values()],
+            "x-",
+            color="black",
+            lw=0.8,
+            label="" if index else "elliptic integrals",
+        )
         for result in results:
             _points(axes, result, "load", what, "" if index else result.model)
     axes.annotate("reach/L", (2, 0.86))
@@ -96,22 +121,39 @@ def _tip_loads(figure: Any, results: Sequence[CaseResult]) -> None:
 
 
 def _bend_twist(figure: Any, results: Sequence[CaseResult]) -> None:
-    for column, (result, axes) in enumerate(zip(results, figure.subplots(1, len(results), sharey=True, squeeze=False)[0], strict=True)):
+    for column, (result, axes) in enumerate(
+        zip(results, figure.subplots(1, len(results), sharey=True, squeeze=False)[0], strict=True)
+    ):
         curves = result.outcome.curves
         for gamma, aside in zip(curves["gamma"], curves["aside"], strict=True):
             out = aside > 1e-3
             axes.plot(curves["x"][out], np.full(out.sum(), gamma), "o", ms=4, color=COLOURS[result.model])
-            axes.plot(curves["x"][~out], np.full((~out).sum(), gamma), "o", ms=4, mfc="none", mec=COLOURS[result.model])
+            axes.plot(
+                curves["x"][~out],
+                np.full((~out).sum(), gamma),
+                "o",
+                ms=4,
+                mfc="none",
+                mec=COLOURS[result.model],
+            )
         axes.plot([*BEND_TWIST.values()], [*BEND_TWIST], "k--", lw=1)
         axes.set(yscale="log", xlabel="x = Γ^(1/3)/(κₙL)", title=result.model, ylabel="" if column else "Γ")
-    figure.suptitle("Hanging curls: out of the plane (full) or in it (open); rod equations dashed", fontsize="medium")
+    figure.suptitle(
+        "Hanging curls: out of the plane (full) or in it (open); rod equations dashed", fontsize="medium"
+    )
 
 
 def _energy(figure: Any, results: Sequence[CaseResult]) -> None:
     titles = [*results[0].outcome.curves]
-    for column, (title, axes) in enumerate(zip(titles, figure.subplots(1, len(titles), sharey=True, squeeze=False)[0], strict=True)):
+    for column, (title, axes) in enumerate(
+        zip(titles, figure.subplots(1, len(titles), sharey=True, squeeze=False)[0], strict=True)
+    ):
         time, bending, torsion, kinetic, gravity, _ = results[0].outcome.curves[title]
-        for values, label, colour in ((kinetic, "kinetic", "#7f8c8d"), (bending + torsion, "elastic", "#27ae60"), (gravity, "weight", "#8e44ad")):
+        for values, label, colour in (
+            (kinetic, "kinetic", "#7f8c8d"),
+            (bending + torsion, "elastic", "#27ae60"),
+            (gravity, "weight", "#8e44ad"),
+        ):
             axes.plot(time, values, color=colour, lw=1, label=label)
         for result in results:
             curve = result.outcome.curves[title]
@@ -119,12 +161,20 @@ def _energy(figure: Any, results: Sequence[CaseResult]) -> None:
         axes.set(xlabel="time [s]", title=title, ylabel="" if column else "energy / largest kinetic energy")
         axes.title.set_fontsize("medium")
         axes.grid(alpha=0.25)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=7, frameon=False, fontsize="x-small")
+    figure.legend(
+        *axes.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=7,
+        frameon=False,
+        fontsize="x-small",
+    )
 
 
 def _vibration(figure: Any, results: Sequence[CaseResult]) -> None:
     names = [*results[0].outcome.curves]
-    for name, axes in zip(names, figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0], strict=True):
+    for name, axes in zip(
+        names, figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0], strict=True
+    ):
         for result in results:
             time, height = result.outcome.curves[name]
             axes.plot(time, height, color=COLOURS[result.model], lw=1, label=result.model)
@@ -132,7 +182,13 @@ def _vibration(figure: Any, results: Sequence[CaseResult]) -> None:
         axes.set(ylabel="tip height", title=name)
         axes.grid(alpha=0.25)
     axes.set(xlabel="time [periods of the reference]")
-    axes.legend(frameon=False, fontsize="x-small", ncols=5, loc="lower left")
+    figure.legend(
+        *axes.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=5,
+        frameon=False,
+        fontsize="x-small",
+    )
 
 
 def _push(figure: Any, results: Sequence[CaseResult]) -> None:

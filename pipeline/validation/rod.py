@@ -118,7 +118,6 @@ class Rod:
             values.append(float(self.state.points[0, point, axis]))
         return np.array(values)
 
-
     def energy(self) -> float:
         """Total energy [J] of all strands."""
         return float(kernels.energies(self.state, self.rest, self.settings).sum())

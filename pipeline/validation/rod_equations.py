@@ -9,6 +9,7 @@ axes (d1, d2, tangent d3) into the world, and moment m in these axes; the place 
 Source: Antman, "Nonlinear problems of elasticity" (2005), chapter VIII; Kirchhoff's rod with dead loads.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,7 +58,7 @@ class ElasticRod:
             quaternion[i] *= np.sign(quaternion[i] @ quaternion[i - 1])
         return arc, np.concatenate([quaternion.T, np.zeros((3, len(arc)))])
 
-    def _slope(self, force: Array, gamma: float):  # type: ignore[no-untyped-def]
+    def _slope(self, force: Array, gamma: float) -> Callable[[Array, Array], Array]:
         natural = np.array(self.curvature)[:, None]
         softness = np.array([1.0, 1.0, 1 / self.twisting])[:, None]
 

@@ -1,5 +1,7 @@
 """Shapes at rest: cantilevers, catenaries, and that equilibria depend on nothing but the strand."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipeline import kernels
@@ -43,7 +45,7 @@ HAIR_TWISTING = (0.0, TWISTING, TWISTING)  # what is straight by nature needs no
 TIME_STEPS = (0.5e-3, 1e-3, 2e-3, 8e-3, 16e-3)
 
 
-def cantilevers(gammas: list[float], model: Model = "none", points: int = 64) -> Array:
+def cantilevers(gammas: Sequence[float], model: Model = "none", points: int = 64) -> Array:
     """Tip drop over tip reach of strands of these Gammas, clamped horizontally."""
     strands = np.concatenate([straight(gravito_length(gamma), points) for gamma in gammas])
     tips = Rod(strands, clamped(points), settling(model)).to_rest()[:, -1]
@@ -69,7 +71,9 @@ def order(model: Model, quick: bool) -> Outcome:
     errors = np.array([np.abs(cantilevers(gammas, model, count) / reference - 1) for count in points])
     finest = points >= (16 if quick else 32)  # Gamma = 100 is resolved by no fewer
     slopes = -np.polyfit(np.log(points[finest] - 1.5), np.log(errors[finest]), 1)[0]
-    readings = [Reading(f"Gamma {g}, order", float(s), 2.0, 0.05) for g, s in zip(gammas, slopes, strict=True)]
+    readings = [
+        Reading(f"Gamma {g}, order", float(s), 2.0, 0.05) for g, s in zip(gammas, slopes, strict=True)
+    ]
     curves = {f"Gamma {gamma}": error for gamma, error in zip(gammas, errors.T, strict=True)}
     return Outcome(tuple(readings), {"points": points, **curves})
 
@@ -100,7 +104,7 @@ def catenary(model: Model, _quick: bool, points: int = 65) -> Outcome:
         half = ramp * np.array([span, -np.sqrt(1 - span**2), 0]) * length / 2
         chains.append(np.concatenate([half, half[-2::-1] * (-1, 1, 1) + (span * length, 0, 0)]))
     holds = [HEAD] + [0] * (points - 2) + [HAND]
-    rod = Rod(np.array(chains), holds, settling(model), bending=0.0, twisting=0.0)
+    rod = Rod(np.array(chains), holds, settling(model, 8e-3), bending=0.0, twisting=0.0)
     sags = -rod.to_rest()[..., 1].min(axis=1) / length
     rows = zip(CATENARY.items(), sags, strict=True)
     return Outcome(tuple(Reading(f"span/L {span}, sag/L", float(s), sag, 1e-3) for (span, sag), s in rows))
@@ -111,7 +115,9 @@ def drift_of_helix(model: Model, _quick: bool, points: int = 64) -> Outcome:
     curl = helix(0.01, 0.02, 0.2, points)
     rod = Rod(curl, clamped(points), undamped(model, theta=0.6))
     rod.advance(1200)
-    return Outcome((Reading("drift/L in 5 s", float(np.abs(rod.state.points - curl).max() / 0.2), 0.0, 1e-6),))
+    return Outcome(
+        (Reading("drift/L in 5 s", float(np.abs(rod.state.points - curl).max() / 0.2), 0.0, 1e-6),)
+    )
 
 
 def hair(points: int = 32, length: float = 0.2) -> Array:
