@@ -90,8 +90,8 @@ lint: env ## style, types, and who may import whom
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-validate: env ## the physics against closed forms and measurements
-	$(RINGLET) validate
+validate: env ## the physics against closed forms and rod equations; writes docs/validation.md
+	$(RINGLET) validate --page docs/validation.md
 
 images: env ## golden images; differences go to an HTML page
 	$(BIN)/pytest tests/images

@@ -12,7 +12,7 @@ from pipeline.errors import InputError
 Flag = Parameter(negative="", show_default=False)
 Count = Annotated[int, Parameter(help="How many.")]
 
-_CASE = ("name", "model", "measured", "reference", "tolerance", "passed")
+_CASE = ("name", "model", "what", "measured", "reference", "error", "tolerance", "verdict")
 
 bench = App(
     name="bench",
@@ -24,23 +24,43 @@ app.command(bench)
 
 @app.command(group=CHECK_GROUP)
 def validate(
-    case: Annotated[str | None, Parameter(help="Only cases with this in their name.")] = None,
+    case: Annotated[
+        str, Parameter(help="Only cases with this in their name, such as cantilever or rotor.")
+    ] = "",
     *,
-    quick: Annotated[bool, Flag, Parameter(help="Short versions of the cases.")] = False,
+    quick: Annotated[
+        bool, Flag, Parameter(help="Short versions of the cases, in less than a minute.")
+    ] = False,
+    plots: Annotated[Path | None, Parameter(help="Draw pictures into this folder.")] = None,
+    page: Annotated[Path | None, Parameter(help="Write a Markdown page with tables and pictures.")] = None,
     json: Json = False,
 ) -> int:
-    """Compare the physics with closed forms and measurements; exit code 1 outside the tolerance."""
-    from pipeline.validation import run_cases
+    """Compare the physics with closed forms and rod equations; exit code 1 outside a tolerance."""
+    from pipeline.progress import track
+    from pipeline.validation import all_cases
+    from pipeline.validation.page import rows, summary, write_page
+    from pipeline.validation.plots import draw, need_matplotlib
 
-    results = [found for found in run_cases(quick) if case is None or case in found.name]
-    cases = [{name: getattr(found, name) for name in _CASE} for found in results]
+    cases = all_cases(quick, case)
     if not cases:
         raise InputError(f"ringlet validate {case}: no such case")
-    passed = all(found["passed"] for found in cases)
+    if plots or page:
+        need_matplotlib()
+    results = []
+    with track("validate", len(cases), "case") as bar:
+        for each in cases:
+            results.append(each.run())
+            bar.advance()
+    passed = all(result.passed for result in results)
     if json:
-        print_json({"passed": passed, "cases": cases})
+        print_json({"passed": passed, "quick": quick, "cases": rows(results)})
     else:
-        _table(cases, _CASE)
+        _table(rows(results), _CASE)
+        print(f"\n{summary(results)}")
+    if plots:
+        draw(results, plots)
+    if page:
+        write_page(results, page, quick)
     return 0 if passed else 1
 
 

@@ -1,47 +1,60 @@
 """Coulomb friction on an incline: when a strand sticks, and how fast it slides."""
 
-from functools import partial
-
 import numpy as np
 
 from pipeline import kernels
-from pipeline.validation.case import Case
-from pipeline.validation.rod import GRAVITY, Rod, straight, undamped
+from pipeline.validation.case import Law, Model, Outcome, Reading
+from pipeline.validation.rod import GRAVITY, Array, Rod, straight, undamped
 
 SLOPE = 30.0
 # a/g = sin(slope) - mu cos(slope) at 30 degrees
 SLIDING = {0.1: 0.413397, 0.3: 0.240192}
-STICKING = 0.3
 
 
-def incline(degrees: float, friction: float, points: int = 16) -> Rod:
-    """A free straight strand that lies along a slope, the plane y = 0; gravity is tilted instead of the plane."""
-    settings = undamped()
-    angle = np.radians(degrees)
-    settings.gravity = (GRAVITY * float(np.sin(angle)), -GRAVITY * float(np.cos(angle)), 0.0)
+def incline(slopes: Array, friction: float, model: Model, points: int = 16) -> Rod:
+    """Free straight strands that lie along a slope [rad], the plane y = 0; gravity is tilted instead of the plane.
+
+    Loads tilt it, one for each strand, so that all slopes are stepped together.
+    """
+    settings = undamped(model)
     settings.friction, settings.theta = friction, 0.6
-    return Rod(straight(0.1, points), [0] * points, settings, surface=_plane())
+    strands = np.repeat(straight(0.1, points), len(slopes), axis=0)
+    rod = Rod(strands, [0] * points, settings, twisting=0.0, surface=_plane())
+    direction = np.stack([np.sin(slopes), -np.cos(slopes), 0 * slopes], axis=-1)
+    rod.rest.load = rod.rest.mass[..., None] * GRAVITY * direction[:, None]
+    return rod
 
 
-def acceleration(friction: float) -> float:
+def acceleration(friction: float, model: Model = "none") -> float:
     """Acceleration over g of a strand that slides down 30 degrees, over 0.4 s after a start of 0.1 s."""
-    rod = incline(SLOPE, friction)
+    rod = incline(np.radians([SLOPE]), friction, model)
     rod.advance(24)
     before = rod.state.velocity[0, :, 0].mean()
     rod.advance(96)
     return float((rod.state.velocity[0, :, 0].mean() - before) / (96 * rod.settings.dt) / GRAVITY)
 
 
-def sticking_angle() -> float:
-    """Slope [deg] up to which a strand of friction 0.3 stays where it is, by bisection."""
-    low, high = np.degrees(np.arctan(STICKING)) + np.array([-0.5, 0.5])
-    for _ in range(6):
-        middle = (low + high) / 2
-        rod = incline(middle, STICKING)
-        rod.advance(120)
-        slid = float((rod.state.points - rod.points)[..., 0].mean())
-        low, high = (low, middle) if slid > 1e-4 else (middle, high)
-    return float(low + high) / 2
+def sticking_angle(friction: float, model: Model = "none") -> float:
+    """Slope [deg] up to which a strand stays where it is, to 0.01 degrees."""
+    slopes = np.degrees(np.arctan(friction)) + np.linspace(-0.5, 0.5, 101)
+    rod = incline(np.radians(slopes), friction, model)
+    rod.advance(120)
+    slid = (rod.state.points - rod.points)[..., 0].mean(axis=1) > 1e-4
+    first = int(np.argmax(slid)) if slid.any() else 0
+    if first == 0 or not slid[first:].all():
+        return float("nan")
+    return float(slopes[first - 1 : first + 1].mean())
+
+
+def friction(model: Model, _quick: bool) -> Outcome:
+    """Where strands stick, and how fast they slide."""
+    readings = []
+    for mu in SLIDING:
+        stick = float(np.degrees(np.arctan(mu)))
+        readings += [Reading(f"mu {mu}, steepest slope [deg]", sticking_angle(mu, model), stick, 0.1 / stick)]
+    for mu, a in SLIDING.items():
+        readings += [Reading(f"mu {mu}, 30 degrees, a/g", acceleration(mu, model), a, 0.01)]
+    return Outcome(tuple(readings))
 
 
 def _plane() -> kernels.DistanceField:
@@ -51,13 +64,13 @@ def _plane() -> kernels.DistanceField:
     return kernels.DistanceField(np.ascontiguousarray(values), origin, spacing)
 
 
-def cases() -> list[Case]:
-    """All cases of this file."""
-    stick = float(np.degrees(np.arctan(STICKING)))
+def laws() -> list[Law]:
+    """The laws of this file."""
     return [
-        Case("incline sticking angle", "none", sticking_angle, stick, 0.1 / stick),
-        *[
-            Case(f"incline acceleration mu {mu}", "none", partial(acceleration, mu), a, 0.01)
-            for mu, a in SLIDING.items()
-        ],
+        Law(
+            "incline",
+            "A straight strand lies along a slope. It sticks if and only if tan(slope) <= mu, and slides down with "
+            "a = g (sin - mu cos) otherwise (Coulomb).",
+            friction,
+        )
     ]

@@ -5,17 +5,13 @@ and its rerun for hair by Daviet (SIGGRAPH 2023): R = 50 um, rho = 1300 kg/m^3, 
 Everything is float64. Holding points 0 and 1 clamps a strand at the middle of segment 0: lengths count from there.
 """
 
-from typing import Literal
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pipeline import kernels
+from pipeline.validation.case import Model
 
 Array = NDArray[np.float64]
-Model = Literal["rotor", "frenet", "none"]
-TORSION: tuple[Model, ...] = ("rotor", "frenet")
-MODELS: tuple[Model, ...] = (*TORSION, "none")
 
 RADIUS, DENSITY, YOUNG, POISSON = 50e-6, 1300.0, 3e9, 0.45
 GRAVITY = 9.81
@@ -80,26 +76,29 @@ class Rod:
         points: Array,
         holds: list[int],
         settings: kernels.StepSettings,
-        bending: float = BENDING,
-        twisting: float = TWISTING,
+        *,
+        bending: ArrayLike = BENDING,
+        twisting: ArrayLike = TWISTING,
+        start: Array | None = None,
         surface: kernels.DistanceField | None = None,
     ) -> None:
+        """Strands of rest shape `points` (S, P, 3) [m] that stand at `start`, which has the same root segments."""
         self.points, self.settings, self.surface = np.ascontiguousarray(points), settings, surface
         count = len(points)
         self.rest = kernels.rest_shape(
             self.points,
             np.full(count, MASS_PER_LENGTH),
-            np.full(count, bending),
-            np.full(count, twisting),
+            np.array(np.broadcast_to(bending, count), float),
+            np.array(np.broadcast_to(twisting, count), float),
             np.tile(np.array(holds, np.uint8), (count, 1)),
             np.zeros(points.shape[:2]),
         )
-        self.state = kernels.at_rest(self.points)
+        self.state = kernels.at_rest(self.points if start is None else np.ascontiguousarray(start))
 
-    def advance(self, steps: int, hand: Array | None = None) -> kernels.Report:
-        """Take steps with the head at rest; `hand` (steps + 1, 4, 4) moves what the hand holds."""
-        head = np.tile(np.eye(4), (steps + 1, 1, 1))
-        drive = kernels.Drive(head, np.zeros((steps, 3)), hand)
+    def advance(self, steps: int, hand: Array | None = None, head: Array | None = None) -> kernels.Report:
+        """Take steps; `head` and `hand` (steps + 1, 4, 4) move what they hold, else the head stands still."""
+        heads = np.tile(np.eye(4), (steps + 1, 1, 1)) if head is None else head
+        drive = kernels.Drive(heads, np.zeros((steps, 3)), hand)
         return kernels.advance(self.state, self.rest, self.surface, drive, self.settings)
 
     def to_rest(self, limit: float = 60.0, still: float = 1e-9) -> Array:

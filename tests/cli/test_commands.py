@@ -15,7 +15,7 @@ from pipeline import cache
 from pipeline.cli.base import print_json
 from pipeline.cli.main import call
 from pipeline.cli.stages import Batch
-from pipeline.validation import CaseResult
+from pipeline.validation import Law, Outcome, Reading
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(Path(__file__).parent))
@@ -284,27 +284,34 @@ def test_json_knows_no_nan(capsys: pytest.CaptureFixture[str]) -> None:
 def test_validate_reports_each_case_and_fails_outside_the_tolerance(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right = CaseResult("a law", "rotor", 1.001, 1.0, 0.01)
-    monkeypatch.setattr("pipeline.validation.run_cases", lambda _quick: [right])
-    assert call(["validate", "--quick", "--json"]) == 0
+    def law(name: str, measured: float) -> Law:
+        found = Outcome((Reading("a figure", measured, 1.0, 0.01),))
+        return Law(name, "about", lambda _model, _quick: found, ("rotor",), {})
+
+    laws = [law("a law", 1.001), law("another law", 1.02)]
+    monkeypatch.setattr("pipeline.validation.all_laws", lambda: laws)
+    assert call(["validate", "a law", "--quick", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found == {
         "passed": True,
+        "quick": True,
         "cases": [
             {
                 "name": "a law",
                 "model": "rotor",
+                "what": "a figure",
                 "measured": 1.001,
                 "reference": 1.0,
+                "error": pytest.approx(0.001),
                 "tolerance": 0.01,
-                "passed": True,
+                "verdict": "met",
+                "reason": "",
             }
         ],
     }
-    wrong = CaseResult("another law", "none", float("nan"), 1.0, 0.01)
-    monkeypatch.setattr("pipeline.validation.run_cases", lambda _quick: [right, wrong])
     assert call(["validate"]) == 1
-    assert "another law" in capsys.readouterr().out
+    assert "another law" in (printed := capsys.readouterr().out)
+    assert "2 cases, 2 figures: 1 met, 1 NOT MET." in printed
     assert call(["validate", "no such"]) == 2
 
 
