@@ -38,7 +38,7 @@ def patch(radius: float, pitch: float, random_phase: bool) -> Floats:
 def hung(rest: Floats) -> Floats:
     """Every strand on its own, at rest with the head tilted by 70 degrees."""
     tilted = (9.81 * np.sin(1.22), -9.81 * np.cos(1.22), 0.0)
-    simulate = Simulate(settle=4.0, gravity=tilted, precision="float64", hair=Hair(radius=35e-6))
+    simulate = Simulate(settle=4.0, gravity=tilted, rest="groom", hair=Hair(radius=35e-6))
     held = held_ends(np.tile([2, 0], (len(rest), 1)), rest.shape[1])
     offset = np.zeros(rest.shape[:2], np.float32)
     simulation = Simulation(simulate, 1, Guides(rest.astype(np.float32), held, offset))
@@ -70,19 +70,19 @@ def results(radius: float, pitch: float, random_phase: bool) -> dict[str, Floats
 @pytest.mark.parametrize(
     ("radius", "pitch", "random_phase", "measured"),
     [
-        (1e-5, 0.02, False, 0.018),
-        (0.005, 0.02, False, 0.025),
-        (0.005, 0.02, True, 0.084),
-        (0.003, 0.01, True, 0.080),
+        (1e-5, 0.02, False, 0.0184),
+        (0.005, 0.02, False, 0.0107),
+        (0.005, 0.02, True, 0.0267),
+        (0.003, 0.01, True, 0.0139),
     ],
     ids=["straight", "curly", "curly, random phase", "tight, random phase"],
 )
 def test_strands_go_where_their_own_simulation_would_take_them(
     radius: float, pitch: float, random_phase: bool, measured: float
 ) -> None:
-    """Mean distance, after a fall through half of the length; what Bishop frames alone get wrong by 19 to 26 %.
+    """Mean distance, after a fall through a third of the length and more.
 
-    Measured: by this test when the fit of rotations was written; the rest is what curls of another phase do.
+    Measured: by this test with torsion "kirchhoff" and clamped roots; the rest is what curls of another phase do.
     """
     found = results(radius, pitch, random_phase)
     error = {name: np.linalg.norm(x - found["truth"], axis=2).mean() / LENGTH for name, x in found.items()}
@@ -90,7 +90,7 @@ def test_strands_go_where_their_own_simulation_would_take_them(
         f"error {error['expanded']:.2%} of the length; blended positions {error['blended']:.2%}; "
         f"strands moved by {error['rest']:.0%}"
     )
-    assert error["rest"] > 0.3
+    assert error["rest"] > 0.25
     assert error["expanded"] < 1.2 * measured
 
 
