@@ -13,6 +13,8 @@
 #include "path.hpp"
 #include "settings.hpp"
 
+#include <optional>
+
 namespace ringlet {
 
 inline constexpr double kRow = 1e3;         // stiffness of a row, in m / dt^2
@@ -55,7 +57,8 @@ template <class Real> struct HeadStep {
     /// rest frame at the beginning and at the end.
     Vec3<Real> between(Vec3<Real> begin, Vec3<Real> end) const {
         const L half = splat(Real(0.5));
-        return Rigid<Real>(halfway(before, after).inverse())(half * (Rigid<Real>(before)(begin) + turn(end)));
+        if (!middle_) middle_.emplace(halfway(before, after).inverse());
+        return (*middle_)(half * (Rigid<Real>(before)(begin) + turn(end)));
     }
 
   private:
@@ -75,6 +78,8 @@ template <class Real> struct HeadStep {
         for (int k = 0; k < 3; ++k) sample<Real>(deformation->drift[k], at, moved[k], slope);
         return turn(at + splat(drift) * Vec3<Real>{moved[0], moved[1], moved[2]});
     }
+
+    mutable std::optional<Rigid<Real>> middle_; // world -> rest frame at half time, once it is asked for
 };
 
 template <class Real> struct Contacts {
@@ -102,25 +107,24 @@ template <class Real> struct Contacts {
         for (int i = 0; i < P; ++i) phi[i] -= nearer;
     }
 
-    /// Samples the field at point i; false when no lane can be within `reach` of the surface, or has passed it in this
-    /// step. A sample is spared when the last one and the steepest slope of the field prove as much.
-    RINGLET_INLINE bool near(const HeadStep<Real> &head, int i, Vec3<Real> x, L reach, L &distance,
+    /// Samples the field at point i; false when none of the lanes `of` can be within `reach` of the surface, or has
+    /// passed it in this step. A sample is spared when the last one and the steepest slope of the field prove as much.
+    RINGLET_INLINE bool near(const HeadStep<Real> &head, int i, Vec3<Real> x, L reach, Mask<Real> of, L &distance,
                              Vec3<Real> &normal) {
         const Vec3<Real> at = head.local(x), moved = at - nearby[i], begun = start[i] - nearby[i];
         L square = maximum<Real>(dot(moved, moved), dot(begun, begun)); // a ball that holds both ends holds the way
-        L bound = phi[i] - Real(head.steepest) * square_root<Real>(square);
-        if (!any<Real>(~(bound > reach))) return false;
+        const L room = phi[i] - reach;
+        const Real slope = Real(head.steepest);
+        if (!any<Real>(of & ~((room > none) & (room * room > slope * slope * square)))) return false;
         head.measure(at, distance, normal);
         nearby[i] = at, phi[i] = distance;
         const Vec3<Real> way = at - start[i];
         const Real far = Real(kWay * head.field->spacing);
-        if (any<Real>(dot(way, way) > far * far)) {
-            const Vec3<Real> between = head.between(start[i], at);
-            follow<Real>(head, Way<Real>(start[i], between, at), dot(way, way) > far * far, distance, normal);
-        }
-        if (!any<Real>(distance < reach)) return false;
-        L steepness = square_root<Real>(dot(normal, normal) + Real(1e-20));
-        normal = head.turn.turn((1 / steepness) * normal);
+        const Mask<Real> goes_far = dot(way, way) > far * far;
+        if (any<Real>(of & goes_far))
+            follow<Real>(head, Way<Real>(start[i], head.between(start[i], at), at), goes_far, distance, normal);
+        if (!any<Real>(of & (distance < reach))) return false;
+        normal = head.turn.turn(inverse_root<Real>(dot(normal, normal) + Real(1e-20)) * normal);
         return true;
     }
 
@@ -135,7 +139,8 @@ template <class Real> struct Contacts {
             L distance;
             Vec3<Real> normal;
             const L reach = b.offset[i] + Real(kKeepGap);
-            if (!near(head, i, from.x[i] + splat(dt) * from.v[i], reach, distance, normal)) continue;
+            const Vec3<Real> predicted = from.x[i] + splat(dt) * from.v[i];
+            if (!near(head, i, predicted, reach, b.free[i] > none, distance, normal)) continue;
             L g = distance - b.offset[i];
             Mask<Real> on = (b.free[i] > none) & ((g < none) | ((from.touch[i] > none) & (g < Real(kKeepGap))));
             row[i] = select<Real>(on, one, none);
@@ -179,8 +184,9 @@ template <class Real> struct Contacts {
             L distance;
             Vec3<Real> normal;
             const L reach = b.offset[i] + Real(kKeepGap);
-            if (!near(head, i, to.x[i], reach, distance, normal)) continue;
-            Mask<Real> here = busy & (b.free[i] > none) & (distance < reach);
+            const Mask<Real> moves = busy & (b.free[i] > none);
+            if (!near(head, i, to.x[i], reach, moves, distance, normal)) continue;
+            Mask<Real> here = moves & (distance < reach);
             n[i] = select(here, normal, n[i]);
             L depth = select<Real>(here, maximum<Real>(b.offset[i] - distance, none), none);
             deepest = maximum<Real>(deepest, depth);
@@ -200,7 +206,7 @@ template <class Real> struct Contacts {
         for (int i = b.first; head.field && i < b.P; ++i) {
             L distance;
             Vec3<Real> normal;
-            if (!near(head, i, x[i], b.offset[i], distance, normal)) continue;
+            if (!near(head, i, x[i], b.offset[i], b.free[i] > none, distance, normal)) continue;
             deepest = maximum<Real>(deepest, select<Real>(b.free[i] > none, b.offset[i] - distance, none));
         }
         return deepest;
@@ -212,9 +218,9 @@ template <class Real> struct Contacts {
         L budget = select<Real>(here, friction * (depth + fresh[i]), none);
         fresh[i] = select<Real>(here, none, fresh[i]);
         Vec3<Real> moved = to.x[i] - head.carried(old), slid = moved - dot(moved, n[i]) * n[i];
-        L length = square_root<Real>(dot(slid, slid) + Real(1e-30));
-        Mask<Real> holds = (budget >= length) & (budget > none);
-        L part = select<Real>(holds, one, budget / length);
+        const L square = dot(slid, slid) + Real(1e-30), per_length = inverse_root<Real>(square);
+        Mask<Real> holds = (budget * budget >= square) & (budget > none);
+        L part = select<Real>(holds, one, budget * per_length);
         to.x[i] = to.x[i] - part * slid;
         stuck[i] = select<Real>(holds, one, stuck[i]);
     }

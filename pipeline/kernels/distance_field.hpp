@@ -45,42 +45,34 @@ struct DistanceField {
 template <class Real>
 __attribute__((noinline)) void sample(const DistanceField &field, Vec3<Real> x, Lanes<Real> &phi,
                                       Vec3<Real> &gradient) {
-    constexpr int W = kLanes<Real>;
+    using L = Lanes<Real>;
     const int ny = field.n[1], nz = field.n[2], row = ny * nz;
     const Real inverse = Real(1 / field.spacing);
-    const Lanes<Real> ux = (x.x - Real(field.origin[0])) * inverse, uy = (x.y - Real(field.origin[1])) * inverse,
-                      uz = (x.z - Real(field.origin[2])) * inverse;
-    const Real last[3] = {field.n[0] - Real(1.001), ny - Real(1.001), nz - Real(1.001)};
+    const L zero = splat(Real(0));
+    const auto clamped = [&](L u, int n) RINGLET_ALWAYS {
+        return select<Real>(u >= zero, minimum<Real>(u, splat(n - Real(1.001))), zero);
+    };
+    const L a = clamped((x.x - Real(field.origin[0])) * inverse, field.n[0]);
+    const L b = clamped((x.y - Real(field.origin[1])) * inverse, ny);
+    const L c = clamped((x.z - Real(field.origin[2])) * inverse, nz);
+    const Mask<Real> ia = __builtin_convertvector(a, Mask<Real>), ib = __builtin_convertvector(b, Mask<Real>),
+                     ic = __builtin_convertvector(c, Mask<Real>);
+    const Mask<Real> at = (ia * ny + ib) * nz + ic;
+    const L fa = a - __builtin_convertvector(ia, L), fb = b - __builtin_convertvector(ib, L),
+            fc = c - __builtin_convertvector(ic, L);
     const float *values = field.values.data();
-    Real out[4][W], u[3][W];
-    __builtin_memcpy(u[0], &ux, sizeof ux);
-    __builtin_memcpy(u[1], &uy, sizeof uy);
-    __builtin_memcpy(u[2], &uz, sizeof uz);
-#pragma omp simd
-    for (int k = 0; k < W; ++k) {
-        const Real a = u[0][k] >= 0 ? (u[0][k] < last[0] ? u[0][k] : last[0]) : Real(0);
-        const Real b = u[1][k] >= 0 ? (u[1][k] < last[1] ? u[1][k] : last[1]) : Real(0);
-        const Real c = u[2][k] >= 0 ? (u[2][k] < last[2] ? u[2][k] : last[2]) : Real(0);
-        const int ia = int(a), ib = int(b), ic = int(c), at = (ia * ny + ib) * nz + ic;
-        const Real fa = a - ia, fb = b - ib, fc = c - ic;
-        const Real v000 = values[at], v001 = values[at + 1], v010 = values[at + nz], v011 = values[at + nz + 1];
-        const Real v100 = values[at + row], v101 = values[at + row + 1];
-        const Real v110 = values[at + row + nz], v111 = values[at + row + nz + 1];
-        // along z, then y, then x; the gradient is the derivative of the same interpolant
-        const Real z00 = v000 + fc * (v001 - v000), z01 = v010 + fc * (v011 - v010);
-        const Real z10 = v100 + fc * (v101 - v100), z11 = v110 + fc * (v111 - v110);
-        const Real y0 = z00 + fb * (z01 - z00), y1 = z10 + fb * (z11 - z10);
-        const Real d0 = (1 - fb) * (v001 - v000) + fb * (v011 - v010);
-        const Real d1 = (1 - fb) * (v101 - v100) + fb * (v111 - v110);
-        out[0][k] = y0 + fa * (y1 - y0);
-        out[1][k] = y1 - y0;
-        out[2][k] = (1 - fa) * (z01 - z00) + fa * (z11 - z10);
-        out[3][k] = (1 - fa) * d0 + fa * d1;
-    }
-    __builtin_memcpy(&phi, out[0], sizeof phi);
-    __builtin_memcpy(&gradient.x, out[1], sizeof phi);
-    __builtin_memcpy(&gradient.y, out[2], sizeof phi);
-    __builtin_memcpy(&gradient.z, out[3], sizeof phi);
+    L v000, v001, v010, v011, v100, v101, v110, v111;
+    gather_pairs<Real>(values, at, v000, v001);
+    gather_pairs<Real>(values + nz, at, v010, v011);
+    gather_pairs<Real>(values + row, at, v100, v101);
+    gather_pairs<Real>(values + row + nz, at, v110, v111);
+    // along z, then y, then x; the gradient is the derivative of the same interpolant
+    const L d00 = v001 - v000, d01 = v011 - v010, d10 = v101 - v100, d11 = v111 - v110;
+    const L z00 = v000 + fc * d00, z01 = v010 + fc * d01, z10 = v100 + fc * d10, z11 = v110 + fc * d11;
+    const L e0 = z01 - z00, e1 = z11 - z10, y0 = z00 + fb * e0, y1 = z10 + fb * e1;
+    const L d0 = d00 + fb * (d01 - d00), d1 = d10 + fb * (d11 - d10);
+    phi = y0 + fa * (y1 - y0);
+    gradient = {y1 - y0, e0 + fa * (e1 - e0), d0 + fa * (d1 - d0)};
 }
 
 } // namespace ringlet

@@ -127,6 +127,31 @@ RINGLET_INLINE int write_set_lanes(Mask<float> mask, int first, int *to) {
 #endif
 }
 
+/// Reads values[at] and values[at + 1] of every lane.
+template <class Real>
+RINGLET_INLINE void gather_pairs(const float *values, Mask<Real> at, Lanes<Real> &first, Lanes<Real> &second) {
+#ifdef __AVX512F__
+    if constexpr (sizeof(Real) == 4) {
+        const __m512i even = _mm512_set_epi32(30, 28, 26, 24, 22, 20, 18, 16, 14, 12, 10, 8, 6, 4, 2, 0);
+        __m256i half[2];
+        __builtin_memcpy(half, &at, sizeof at);
+        const __m512d none = _mm512_setzero_pd();
+        const __m512 low = _mm512_castpd_ps(_mm512_mask_i32gather_pd(none, 0xff, half[0], values, 4));
+        const __m512 high = _mm512_castpd_ps(_mm512_mask_i32gather_pd(none, 0xff, half[1], values, 4));
+        first = Lanes<Real>(_mm512_permutex2var_ps(low, even, high));
+        second = Lanes<Real>(_mm512_permutex2var_ps(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high));
+    } else {
+        const __m512d none = _mm512_setzero_pd();
+        const __m512i pairs = _mm512_castpd_si512(_mm512_mask_i64gather_pd(none, 0xff, __m512i(at), values, 4));
+        const __m256i odd = _mm512_maskz_cvtepi64_epi32(0xff, _mm512_maskz_srli_epi64(0xff, pairs, 32));
+        first = Lanes<Real>(_mm512_maskz_cvtps_pd(0xff, _mm256_castsi256_ps(_mm512_maskz_cvtepi64_epi32(0xff, pairs))));
+        second = Lanes<Real>(_mm512_maskz_cvtps_pd(0xff, _mm256_castsi256_ps(odd)));
+    }
+#else
+    for (int k = 0; k < kLanes<Real>; ++k) first[k] = Real(values[at[k]]), second[k] = Real(values[at[k] + 1]);
+#endif
+}
+
 template <class Real> struct Vec3 {
     Lanes<Real> x, y, z;
 
