@@ -236,21 +236,24 @@ def test_a_diverged_run_keeps_its_state(tmp_path: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(Simulation, "next_frame", poisoned)
     with pytest.raises(
-        SimulationDiverged, match=r"guide 1 \(strand 1 of the groom; its state is in .*diverged\.h5"
+        SimulationDiverged,
+        match=r"guide 1 \(strand 1 of the groom; its state is in .*diverged\.h5\) diverged before frame 2;",
     ):
         stage.execute(CONFIG, experiment, "key")
     with cache.open(tmp_path / "diverged.h5", kind="state") as state:
         assert not np.isfinite(state["points"][1]).all()
+        assert np.isfinite(state["points"][0]).all()
+        assert state["step"][0] == CONFIG.simulate.substeps
     assert not experiment.guides.exists()
 
 
-def test_the_energy_plot_is_reproducible(tmp_path: Path) -> None:
+def test_the_picture_of_a_run_is_reproducible(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     pictures = []
     for name in ("a", "b"):
         experiment = experiment_with_groom(tmp_path / name, swatch())
         stage.execute(CONFIG, experiment, "key")
-        pictures.append((experiment.folder / "energy.png").read_bytes())
+        pictures.append((experiment.folder / "diagnostics.png").read_bytes())
     assert pictures[0] == pictures[1]
     assert pictures[0].startswith(b"\x89PNG")
 
