@@ -60,7 +60,7 @@ def project(folder: Path, frames: list[Points], **simulate: object) -> tuple[Con
         name="body",
         scene={"head": str(head), "body": str(folder / "body.%04d.obj") if frames else None},
         groom={"source": str(folder / "hair.tfx"), "points": POINTS, "strands": 40, "guides": 40},
-        simulate={"frames": FRAMES, "settle": 0.2, "contact": {"spacing": 5e-3}, **simulate},
+        simulate={"frames": FRAMES, "settle": 0.2, "rest": "groom", "contact": {"spacing": 5e-3}, **simulate},
     )
     experiment = cache.Experiment(folder / "out")
     groom_stage.execute(config, experiment, "groom")
