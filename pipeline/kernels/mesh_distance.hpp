@@ -138,7 +138,7 @@ class MeshDistance {
     int closest(Vec q, double (&weight)[3]) const {
         const double p[3] = {q.x, q.y, q.z};
         int low[3], best = -1;
-        for (int k = 0; k < 3; ++k) low[k] = std::clamp(int((p[k] - origin[k]) / spacing), 0, n[k] - 2);
+        for (int k = 0; k < 3; ++k) low[k] = int(std::clamp((p[k] - origin[k]) / spacing, 0.0, n[k] - 2.0));
         double nearest = std::numeric_limits<double>::infinity();
         for (int side = 0; side < 8; ++side) {
             const int t = owner[node(low[0] + (side & 1), low[1] + (side >> 1 & 1), low[2] + (side >> 2))];
@@ -182,8 +182,8 @@ class MeshDistance {
             const double high[3] = {std::max({a.x, b.x, c.x}), std::max({a.y, b.y, c.y}), std::max({a.z, b.z, c.z})};
             int first[3], last[3];
             for (int k = 0; k < 3; ++k) {
-                first[k] = std::max(0, int(std::ceil((low[k] - reach - origin[k]) / spacing)));
-                last[k] = std::min(n[k] - 1, int(std::floor((high[k] + reach - origin[k]) / spacing)));
+                first[k] = int(std::clamp(std::ceil((low[k] - reach - origin[k]) / spacing), 0.0, double(n[k])));
+                last[k] = int(std::clamp(std::floor((high[k] + reach - origin[k]) / spacing), -1.0, n[k] - 1.0));
             }
             for (int x = std::max(first[0], begin); x <= std::min(last[0], end - 1); ++x)
                 for (int y = first[1]; y <= last[1]; ++y)

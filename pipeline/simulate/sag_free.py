@@ -81,16 +81,18 @@ def hold_groom(
     rest: kernels.RestShape,
     field: kernels.DistanceField | None,
     gravity: tuple[float, float, float],
-    pose: _Vectors,
+    poses: _Vectors,
     options: SagFree,
 ) -> Start:
     """Change strains, stiffness and contact offsets of a rest shape so that its points are at rest.
 
-    Gravity [m/s^2] and `rest.load` act in the world, in which the head has this pose (4, 4). Guides without a clamped
+    Gravity [m/s^2] and `rest.load` act in the world, in which the roots have these poses (G, 4, 4), or (1, 4, 4) where
+    all go with the head. Guides without a clamped
     root keep the groom as their rest shape.
     """
-    turn = pose[:3, :3]
-    load = np.ascontiguousarray(rest.mass[..., None] * (np.array(gravity) @ turn) + rest.load @ turn)
+    turn = poses[:, :3, :3]
+    weight = (np.array(gravity) @ turn)[:, None]
+    load = np.ascontiguousarray(rest.mass[..., None] * weight + rest.load @ turn)
     distance, normal = _head(rest, field)
     free, outside = rest.held == 0, distance >= 0
     offset = np.where(free & outside, np.minimum(rest.offset, distance), rest.offset)

@@ -71,9 +71,6 @@ class Simulation:
             )
         self.simulate = simulate
         self.rest = rest_shape(simulate.hair, guides.points, guides.held, guides.offset)
-        load = self.rest.load
-        load[:, -1] = simulate.tip_load
-        self.rest.load = load
         self.field = guides.field
         self.settings = step_settings(simulate)
         self.head = head_motion(simulate.motion, simulate.fps)
@@ -89,6 +86,9 @@ class Simulation:
         self.step = 0
         self.sag_free: Report | None = None
         self.state = self._first_state(guides.points)
+        load = self.rest.load  # after the groom has found its rest: it is to give way to this load
+        load[:, -1] += simulate.tip_load
+        self.rest.load = load
         self._diagnostics = _summary(None)
 
     def settle(self, report: Callable[[int], None] = lambda _: None) -> None:
@@ -175,7 +175,7 @@ class Simulation:
             np.ascontiguousarray(moved, precision), np.ascontiguousarray(directors, precision)
         )
         if wanted(self.simulate, self.rest):
-            start = hold_groom(self.rest, self.field, self.simulate.gravity, pose, self.simulate.sag_free)
+            start = hold_groom(self.rest, self.field, self.simulate.gravity, each, self.simulate.sag_free)
             state.tension[:], state.contact[:] = start.tension, start.contact
             self.sag_free = start.report
         return state

@@ -60,7 +60,7 @@ def project(folder: Path, frames: list[Points], **simulate: object) -> tuple[Con
         name="body",
         scene={"head": str(head), "body": str(folder / "body.%04d.obj") if frames else None},
         groom={"source": str(folder / "hair.tfx"), "points": POINTS, "strands": 40, "guides": 40},
-        simulate={"frames": FRAMES, "settle": 0.2, "contact": {"spacing": 5e-3}, **simulate},
+        simulate={"frames": FRAMES, "settle": 0.2, "rest": "groom", "contact": {"spacing": 5e-3}} | simulate,
     )
     experiment = cache.Experiment(folder / "out")
     groom_stage.execute(config, experiment, "groom")
@@ -220,6 +220,23 @@ def test_every_strand_grows_from_the_skin_of_its_frame_and_is_drawn_there(tmp_pa
     changed = (np.abs(first.astype(int) - last.astype(int)).max(axis=2) > 8).mean()
     print(f"{changed:.0%} of the pixels change from frame 1 to frame {FRAMES}")
     assert changed > 0.02
+
+
+def test_a_sag_free_groom_is_at_rest_on_the_skin_of_the_first_frame(tmp_path: Path) -> None:
+    """The skin carries and turns every strand; gravity does not turn with it."""
+    points, _ = rest_mesh()
+    config, experiment = project(tmp_path, [bent(points, 0.6)], rest="sag_free")
+    guides = stage.read_guides(experiment)[0]
+    simulation = Simulation(config.simulate, 1, guides)
+    start = simulation.state.points.copy()
+    carried = np.abs(start - guides.points).max()
+    simulation.settle()
+    moved = np.linalg.norm(simulation.state.points - start, axis=2)
+    print(
+        f"the skin carries hair by {carried * 1e3:.0f} mm; settling moves it by {np.median(moved) * 1e3:.4f} mm (median)"
+    )
+    assert carried > 0.01
+    assert np.median(moved) < 1e-5
 
 
 def test_a_resumed_run_on_a_deforming_skin_is_bit_identical(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def hanging(held: NDArray[np.uint8], lean: float = 0.02) -> Guides:
 
 
 def settled(guides: Guides, **values: object) -> Simulation:
-    simulation = Simulation(Simulate(settle=1.0, **values), 1, guides)
+    simulation = Simulation(Simulate(settle=1.0, rest="groom", **values), 1, guides)
     simulation.settle()
     return simulation
 

@@ -152,7 +152,7 @@ class Simulate(Section):
     tips_file: str | None = None
     """Motion of pinned tips relative to the head, as a file of transforms [m] (see motion.file)."""
     tip_load: tuple[Force, Force, Force] = (0.0, 0.0, 0.0)
-    """Constant force on the tip of every guide [N], in the world: a bead, a pull; a hair of 25 cm weighs 16 uN."""
+    """Constant force on the tip of every guide [N], in the world: a bead, a pull; a hair of 25 cm weighs 16 uN. A sag-free groom bears its weight, not this."""
 
     @model_validator(mode="after")
     def _one_motion_of_tips(self) -> "Simulate":
