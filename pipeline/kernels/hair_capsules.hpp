@@ -94,9 +94,7 @@ template <class Real> class CapsuleForce final : public NeighbourForce<Real> {
         bool inside[2][kLanes<Real>];
         for (int i = 0; i < capsules_.P; ++i) {
             const Vec3<Real> v = resident.now.v[i], x = resident.now.x[i] + theta_dt_ * v, at = local(x);
-            const Mask<Real> here = (at.x >= lowest.x) & (at.x <= highest.x) & (at.y >= lowest.y) &
-                                    (at.y <= highest.y) & (at.z >= lowest.z) & (at.z <= highest.z) &
-                                    (dot(v, v) < Real(1e12));
+            const Mask<Real> here = inside(at, lowest, highest) & (dot(v, v) < Real(1e12));
             for (int lane = 0; lane < resident.index.count; ++lane) {
                 float(&end)[6] = ends[i % 2][lane];
                 end[0] = float(x.x[lane]), end[1] = float(x.y[lane]), end[2] = float(x.z[lane]);
