@@ -1,4 +1,4 @@
-"""How fast guides are stepped: a full head of hair that lies on a round head which shakes."""
+"""How fast guides are stepped: waves that lie on a round head which shakes, or curls that fall onto it."""
 
 import time
 from typing import Literal
@@ -18,6 +18,7 @@ _STRANDS = 60  # strands that a guide stands for
 _OFFSET, _LIFT = 1e-3, 15e-3  # distance that the lowest and the uppermost layer keep from the head [m]
 _FRAMES = 20
 _REPEATS = 7
+_CURL, _PITCH = 8e-3, 20e-3  # radius and pitch of the curls that fall [m]
 
 
 def bench(
@@ -26,22 +27,34 @@ def bench(
     precision: Literal["float32", "float64"] = "float32",
     threads: int = 2,
     hair: Literal["none", "grid", "capsule"] = "none",
+    falling: bool = False,
 ) -> dict[str, float]:
-    """Step wavy hair of 25 cm that has settled on a shaking head, at dt = 1/240 s, with the stage's own stepper.
+    """Step hair of 25 cm at dt = 1/240 s with the stage's own stepper.
 
-    `hair` is the method of hair-hair contact. Returns ns_per_point_step and frames_per_second (10 steps a frame),
-    medians over repeats, threads, and hair_ms_per_step, the part of hair-hair contact.
+    Waves that have settled on a shaking head, medians over repeats; or, `falling`, a second of curls that stand on a
+    head and fall onto one another. `hair` is the method of hair-hair contact. Returns ns_per_point_step,
+    frames_per_second (10 steps a frame), threads, and hair_ms_per_step, the part of hair-hair contact.
     """
     kernels.set_threads(threads)
+    if falling:
+        simulate = Simulate(
+            precision=precision, rest="groom", settle=0, frames=24, hair_contact=HairContact(method=hair)
+        )
+        simulation = Simulation(simulate, seed=1, guides=curly_head(guides, points))
+        return _figures(simulation, _timed(simulation, simulate.frames) / simulate.frames, threads)
     motion = Motion(preset="shake", period=1.0, swings=1000, amplitude=0.3, pivot=(0.0, 0.0, 0.0))
     simulate = Simulate(precision=precision, motion=motion, hair_contact=HairContact(method=hair))
     simulation = Simulation(simulate, seed=1, guides=round_head(guides, points))
     simulation.settle()
     simulation.cost = Cost()
-    seconds = [_timed(simulation) for _ in range(1 + _REPEATS)][1:]
-    frame = float(np.median(seconds)) / _FRAMES
+    seconds = [_timed(simulation, _FRAMES) for _ in range(1 + _REPEATS)][1:]
+    return _figures(simulation, float(np.median(seconds)) / _FRAMES, threads)
+
+
+def _figures(simulation: Simulation, frame: float, threads: int) -> dict[str, float]:
+    guides, points = simulation.state.points.shape[:2]
     return {
-        "ns_per_point_step": round(frame / (simulate.substeps * guides * points) * 1e9, 3),
+        "ns_per_point_step": round(frame / (simulation.simulate.substeps * guides * points) * 1e9, 3),
         "frames_per_second": round(1 / frame, 3),
         "threads": threads,
         "hair_ms_per_step": round(simulation.cost.neighbours / simulation.cost.steps * 1e3, 3),
@@ -71,9 +84,32 @@ def round_head(guides: int, points: int) -> Guides:
     )
 
 
-def _timed(simulation: Simulation) -> float:
+def curly_head(guides: int, points: int) -> Guides:
+    """Curls that stand on the upper half of a sphere like quills."""
+    height, turn = _upper_half(guides)
+    across = np.sqrt(1 - height**2)
+    normal = np.stack([across * np.cos(turn), height, across * np.sin(turn)], axis=-1)
+    east = np.stack([-np.sin(turn), np.zeros_like(turn), np.cos(turn)], axis=-1)
+    rise = _PITCH / (2 * np.pi)
+    angle = np.linspace(0, _LENGTH, points) / np.hypot(_CURL, rise)
+    up, side, ahead = rise * angle, _CURL * (np.cos(angle) - 1), _CURL * np.sin(angle)
+    strands = (
+        (_HEAD + _OFFSET + up)[:, None] * normal
+        + side[:, None] * east
+        + ahead[:, None] * np.cross(normal, east)
+    )
+    return Guides(
+        points=strands.astype(np.float32),
+        held=held_ends(np.tile([2, 0], (guides, 1)), points),
+        offset=np.full(strands.shape[:2], _OFFSET, np.float32),
+        field=_sphere(),
+        strands=_STRANDS * guides,
+    )
+
+
+def _timed(simulation: Simulation, frames: int) -> float:
     start = time.perf_counter()
-    for _ in range(_FRAMES):
+    for _ in range(frames):
         simulation.next_frame()
     return time.perf_counter() - start
 

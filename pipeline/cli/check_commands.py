@@ -74,12 +74,14 @@ def bench_simulate(
     hair: Annotated[
         Literal["none", "grid", "capsule"], Parameter(help="Method of hair-hair contact.")
     ] = "none",
+    falling: Annotated[bool, Flag, Parameter(help="Curls that fall onto one another.")] = False,
     json: Json = False,
 ) -> None:
     """Steps of guides on a head: nanoseconds for each point and step."""
     from pipeline.bench.simulate import bench
 
-    _report(bench(guides=guides, points=points, precision=precision, threads=threads, hair=hair), json)
+    figures = bench(guides, points, precision, threads, hair, falling)
+    _report(figures, json)
 
 
 @bench.command(name="interpolate")

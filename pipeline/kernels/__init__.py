@@ -10,7 +10,8 @@ import os
 
 # Steps of hair-hair contact wait for one another many times a frame. A thread that has waited 0.1 ms gives its
 # processor away: where other work fills the processors, waiting longer made a step ten times slower (measured).
-os.environ.setdefault("GOMP_SPINCOUNT", "3000")
+if "OMP_WAIT_POLICY" not in os.environ:
+    os.environ.setdefault("GOMP_SPINCOUNT", "3000")
 
 from pipeline.kernels import _portable
 

@@ -10,12 +10,9 @@
 // (Closest points: "Real-time collision detection", Ericson 2004, 5.1.9; all cases are selects.)
 #pragma once
 
-#include "simd.hpp"
+#include "rod_data.hpp"
 
 namespace ringlet {
-
-using Floats = Lanes<float>;
-using Points = Vec3<float>;
 
 RINGLET_INLINE Floats clamp_one(Floats s) { return maximum<float>(minimum<float>(s, splat(1.0f)), splat(-1.0f)); }
 

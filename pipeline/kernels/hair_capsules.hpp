@@ -91,20 +91,18 @@ template <class Real> class CapsuleForce final : public NeighbourForce<Real> {
         const Rigid<Real> local(head.inverse());
         const Vec3<Real> lowest = broadcast<Real>(capsules_.lowest), highest = broadcast<Real>(capsules_.highest);
         float ends[2][kLanes<Real>][6]; // by lane: where a point will be, and its velocity
-        bool inside[2][kLanes<Real>];
+        bool valid[2][kLanes<Real>];
         for (int i = 0; i < capsules_.P; ++i) {
             const Vec3<Real> v = resident.now.v[i], x = resident.now.x[i] + theta_dt_ * v, at = local(x);
-            const Mask<Real> here = (at.x >= lowest.x) & (at.x <= highest.x) & (at.y >= lowest.y) &
-                                    (at.y <= highest.y) & (at.z >= lowest.z) & (at.z <= highest.z) &
-                                    (dot(v, v) < Real(1e12));
+            const Mask<Real> here = inside(at, lowest, highest) & (dot(v, v) < Real(1e12));
             for (int lane = 0; lane < resident.index.count; ++lane) {
                 float(&end)[6] = ends[i % 2][lane];
                 end[0] = float(x.x[lane]), end[1] = float(x.y[lane]), end[2] = float(x.z[lane]);
                 end[3] = float(v.x[lane]), end[4] = float(v.y[lane]), end[5] = float(v.z[lane]);
-                inside[i % 2][lane] = here[lane] != 0;
+                valid[i % 2][lane] = here[lane] != 0;
                 if (i == 0) continue;
                 const int rod = resident.index.strand[lane] * (capsules_.P - 1) + i - 1;
-                grid_.put(rod, ends[(i - 1) % 2][lane], end, inside[0][lane] && inside[1][lane]);
+                grid_.put(rod, ends[(i - 1) % 2][lane], end, valid[0][lane] && valid[1][lane]);
             }
         }
     }

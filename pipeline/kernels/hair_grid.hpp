@@ -230,14 +230,14 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
         for (int lane = 0; lane < resident.index.count; ++lane) own[lane] = -1;
         Vec3<Real> low{far, far, far}, high{-far, -far, -far};
         for (int i = 0; i < P; ++i) {
-            const Vec3<Real> at = per_cell * local(resident.now.x[i]);
-            const M here = own & (at.x >= lowest.x) & (at.x <= highest.x) & (at.y >= lowest.y) & (at.y <= highest.y) &
-                           (at.z >= lowest.z) & (at.z <= highest.z) & (dot(resident.now.v[i], resident.now.v[i]) < Real(1e12));
-            places_[number * size_t(P) + i] = select(here, at, Vec3<Real>{-far, -far, -far});
-            low = {minimum<Real>(low.x, select<Real>(here, at.x, far)), minimum<Real>(low.y, select<Real>(here, at.y, far)),
-                   minimum<Real>(low.z, select<Real>(here, at.z, far))};
-            high = {maximum<Real>(high.x, select<Real>(here, at.x, -far)), maximum<Real>(high.y, select<Real>(here, at.y, -far)),
-                    maximum<Real>(high.z, select<Real>(here, at.z, -far))};
+            const Vec3<Real> v = resident.now.v[i], at = per_cell * local(resident.now.x[i]);
+            const M here = own & inside(at, lowest, highest) & (dot(v, v) < Real(1e12));
+            const Vec3<Real> if_low = select(here, at, Vec3<Real>{far, far, far});
+            const Vec3<Real> if_high = select(here, at, Vec3<Real>{-far, -far, -far});
+            places_[number * size_t(P) + i] = if_high;
+            low = {minimum<Real>(low.x, if_low.x), minimum<Real>(low.y, if_low.y), minimum<Real>(low.z, if_low.z)};
+            high = {maximum<Real>(high.x, if_high.x), maximum<Real>(high.y, if_high.y),
+                    maximum<Real>(high.z, if_high.z)};
         }
         ranges_[number] = {{smallest<Real>(low.x), smallest<Real>(low.y), smallest<Real>(low.z)},
                            {largest<Real>(high.x), largest<Real>(high.y), largest<Real>(high.z)}};

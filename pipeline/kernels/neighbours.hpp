@@ -34,6 +34,12 @@ template <class Real> RINGLET_INLINE Vec3<Real> acceleration(const Outside<Real>
                                         C[2] * v.x + C[4] * v.y + C[5] * v.z};
 }
 
+/// Whether a point is in a box; not-a-number is not.
+template <class Real> RINGLET_INLINE Mask<Real> inside(Vec3<Real> at, Vec3<Real> lowest, Vec3<Real> highest) {
+    return (at.x >= lowest.x) & (at.x <= highest.x) & (at.y >= lowest.y) & (at.y <= highest.y) & (at.z >= lowest.z) &
+           (at.z <= highest.z);
+}
+
 /// A block of strands that stays in lanes while all strands go step by step: what is read, and what a step changes.
 template <class Real> struct Resident {
     BlockIndex<Real> index;

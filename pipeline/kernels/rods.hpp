@@ -2,10 +2,11 @@
 //
 // A rod meets those of the 27 cells around its middle. It works out the force on itself only, from all it touches, in
 // the order of the cells: every pair is computed twice, but no lists are kept, so that no result depends on threads or
-// earlier steps. Both sides of a pair compute the same numbers (the lower segment is first): their forces are opposite.
+// earlier steps. Both sides of a pair compute the same numbers (what lies lower in this order is first): their forces are opposite.
 #pragma once
 
 #include "capsule_pairs.hpp"
+#include "rod_data.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,93 +16,6 @@
 #include <omp.h>
 
 namespace ringlet {
-
-/// A segment: 0-2 its middle, 3-5 its half, 6-11 their velocities; a cache line.
-struct alignas(64) Rod {
-    float part[12];
-};
-
-/// Segments as structure of arrays, in groups of three: middles, halves, and their velocities.
-struct Rods {
-    std::vector<float> part[12];
-
-    void resize(size_t count) {
-        for (auto &values : part) values.resize(count + kLanes<float>); // a whole vector can be read anywhere
-    }
-
-    RINGLET_INLINE Points load(int group, size_t at) const {
-        return {read(part[3 * group], at), read(part[3 * group + 1], at), read(part[3 * group + 2], at)};
-    }
-
-    RINGLET_INLINE Points pick(int group, const int *at) const {
-        return {pick_part(3 * group, at), pick_part(3 * group + 1, at), pick_part(3 * group + 2, at)};
-    }
-
-    RINGLET_INLINE Points every(int group, size_t at) const {
-        return {splat(part[3 * group][at]), splat(part[3 * group + 1][at]), splat(part[3 * group + 2][at])};
-    }
-
-    static RINGLET_INLINE Floats read(const std::vector<float> &values, size_t at) {
-        Floats result;
-        __builtin_memcpy(&result, &values[at], sizeof result);
-        return result;
-    }
-
-  private:
-    RINGLET_INLINE Floats pick_part(int k, const int *at) const {
-        float values[kLanes<float>];
-        const float *from = part[k].data();
-#pragma omp simd
-        for (int lane = 0; lane < kLanes<float>; ++lane) values[lane] = from[at[lane]];
-        Floats result;
-        __builtin_memcpy(&result, values, sizeof result);
-        return result;
-    }
-};
-
-/// How near pairs of strands come to each other at rest, where that is nearer than the reach: a hash table.
-class Closeness {
-  public:
-    explicit Closeness(int strands) : strands_(strands), slots_(1024) {}
-
-    /// Notes that two strands come this near.
-    void note(int a, int b, float distance) {
-        if (2 * (used_ + 1) > slots_.size()) grow();
-        Slot &slot = slots_[place(key(a, b))];
-        used_ += slot.key == 0;
-        slot.distance = slot.key == 0 ? distance : std::min(slot.distance, distance);
-        slot.key = key(a, b);
-    }
-
-    float of(int a, int b, float otherwise) const {
-        const Slot &slot = slots_[place(key(a, b))];
-        return slot.key == 0 ? otherwise : slot.distance;
-    }
-
-  private:
-    struct Slot {
-        uint64_t key = 0; // 0: empty
-        float distance = 0;
-    };
-    int strands_;
-    size_t used_ = 0;
-    std::vector<Slot> slots_; // a power of two, at most half of them used
-
-    uint64_t key(int a, int b) const { return uint64_t(std::min(a, b)) * strands_ + std::max(a, b) + 1; }
-
-    size_t place(uint64_t key) const {
-        size_t at = (key * 0x9e3779b97f4a7c15u >> 32) & (slots_.size() - 1);
-        while (slots_[at].key != 0 && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
-        return at;
-    }
-
-    void grow() {
-        std::vector<Slot> old(2 * slots_.size());
-        old.swap(slots_);
-        for (const Slot &slot : old)
-            if (slot.key != 0) slots_[place(slot.key)] = slot;
-    }
-};
 
 /// What all contacts of a rod do to its two points: a force and the matrix C (xx, xy, xz, yy, yz, zz) of each.
 struct RodLoad {
@@ -166,6 +80,10 @@ class RodGrid {
     const RodLoad *load(int rod) const { return touched_[rod] ? &loads_[rod] : nullptr; }
 
   private:
+    struct Extent {
+        float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
+    };
+
     /// What a thread works with: the rods of the 27 cells around one, and the pairs of some rods with others.
     struct Nearby {
         std::vector<float> x, y, z, limit;
@@ -207,10 +125,7 @@ class RodGrid {
     std::vector<uint8_t> valid_, touched_;
     std::vector<RodLoad> loads_;
     std::vector<int> cell_, first_, order_, strand_; // cell of a rod; first place of a cell; rod and strand at a place
-    int from_[3] = {0, 0, 0}, n_[3] = {1, 1, 1};
-    struct Extent {
-        float low[3] = {1e30f, 1e30f, 1e30f}, high[3] = {-1e30f, -1e30f, -1e30f};
-    };
+    int from_[3] = {0, 0, 0}, n_[3] = {1, 1, 1}; // first cell and number of cells
     std::vector<Extent> ranges_;
     std::vector<Nearby> nearby_; // of each thread
 
@@ -305,7 +220,8 @@ class RodGrid {
         for (int lane = 0; lane < W; ++lane) nearby.limit[nearby.count + lane] = 0; // nothing is near enough to these
     }
 
-    template <class T> static RINGLET_INLINE void copy(const std::vector<T> &from, int at, std::vector<T> &to, int place) {
+    template <class T>
+    static RINGLET_INLINE void copy(const std::vector<T> &from, int at, std::vector<T> &to, int place) {
         __builtin_memcpy(&to[place], &from[at], W * sizeof(T));
     }
 
@@ -326,7 +242,8 @@ class RodGrid {
         const int strand = strand_[place];
         int count = 0;
         for (int at = 0; at < nearby.count; at += W) {
-            const Points apart = Points{Rods::read(nearby.x, at), Rods::read(nearby.y, at), Rods::read(nearby.z, at)} - middle;
+            const Points there = {Rods::read(nearby.x, at), Rods::read(nearby.y, at), Rods::read(nearby.z, at)};
+            const Points apart = there - middle;
             const Points away = apart - clamp_one(dot(apart, half) * per_square) * half;
             Mask<float> other;
             __builtin_memcpy(&other, &nearby.strand[at], sizeof other);

@@ -117,8 +117,9 @@ template <class Real> RINGLET_INLINE uint32_t set_lanes(Mask<Real> mask) {
 RINGLET_INLINE int write_set_lanes(Mask<float> mask, int first, int *to) {
 #ifdef __AVX512F__
     const __m512i lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const __m512i numbers = _mm512_add_epi32(lanes, _mm512_set1_epi32(first));
     const uint32_t bits = set_lanes<float>(mask);
-    _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(__mmask16(bits), _mm512_add_epi32(lanes, _mm512_set1_epi32(first))));
+    _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(__mmask16(bits), numbers));
     return __builtin_popcount(bits);
 #else
     int count = 0;

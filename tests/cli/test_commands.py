@@ -335,6 +335,10 @@ def test_compare_fails_when_a_pixel_differs(tmp_path: Path, capsys: pytest.Captu
             ["simulate", "--guides", "16", "--points", "8", "--threads", "1"],
             {"ns_per_point_step", "frames_per_second", "threads"},
         ),
+        (
+            ["simulate", "--guides", "16", "--points", "8", "--hair", "capsule", "--falling"],
+            {"hair_ms_per_step", "frames_per_second"},
+        ),
         (["interpolate", "--strands", "2000", "--points", "8"], {"seconds_per_frame", "peak_rss_gb"}),
         (
             ["render", "--strands", "500", "--points", "8", "--size", "64x48", "--samples", "1"],

@@ -195,12 +195,12 @@ def test_crossing_strands_stick_below_the_friction_angle_and_slide_above() -> No
 @pytest.mark.parametrize("hair", ["straight", "curly"])
 def test_a_bundle_from_the_side_is_wider_and_comes_to_rest(hair: str) -> None:
     strand = helix(0.008, 0.02, 0.25, 32) if hair == "curly" else np.linspace([0.0, 0, 0], [0.25, 0, 0], 32)
-    found = {}
+    found, step = {}, settings(drag=11.0, drag_speed=15.0)
     for name in ("none", "capsule"):
         rest, _ = bundle(strand)
         state = kernels.at_rest(np.ascontiguousarray(rest.points @ FROM_THE_SIDE[:3, :3].T))
         neighbours = capsules(rest, radius=2e-3) if name == "capsule" else None
-        kernels.advance(state, rest, None, drive(1440, lambda _: FROM_THE_SIDE), settings(), neighbours)
+        kernels.advance(state, rest, None, drive(1440, lambda _: FROM_THE_SIDE), step, neighbours)
         speed = np.sqrt((state.velocity**2).sum(-1).mean())
         found[name] = width(state)
         print(f"{hair}, {name}: width {found[name] * 1e3:.1f} mm, rms speed {speed * 1e3:.2f} mm/s")
