@@ -86,6 +86,8 @@ class RestShape:
     """(S, P-3) [N m]: G, the stiffness of "rotor" about segments 1 .. P-3; fades to 0 where the strand is straight."""
     root_weight: _F64
     """(S,) [N m]: the same about segment 0 where the head holds points 0 and 1; 0 lets a curl swivel about its root."""
+    root_shift: _F64
+    """(S, 2): what the first bend of "rotor" at rest, seen in the root's frame, is more than the groom's; 0 by default."""
     held: NDArray[np.uint8]
     """(S, P): 0 free, 1 carried by the head's pose, 2 carried by the hand's pose. Any points may be held."""
     offset: _F64

@@ -178,7 +178,7 @@ static RestShape rest_shape(Points points, Array<const double, -1> mass_per_leng
     rest.length.resize(S * (P - 1)), rest.mass.resize(S * P);
     rest.curvature.resize(S * (P - 2)), rest.torsion.resize(S * (P - 4));
     rest.dihedral.resize(S * (P - 3)), rest.ratio.resize(S * (P - 3)), rest.weight.resize(S * (P - 3));
-    rest.root_weight.resize(S);
+    rest.root_weight.resize(S), rest.root_shift.resize(S * 2);
     for (int s = 0; s < rest.S; ++s) derive_strand(rest, s, mass_per_length.data()[s], kappa_0);
     const Doubles directors = untwisted(points);
     rest.bending_2 = rest.bending, rest.load.resize(S * P * 3);
@@ -227,6 +227,9 @@ static void bind_rest(nb::module_ &m) {
     property<&RestShape::ratio, 3>(cls, "ratio");
     property<&RestShape::weight, 3>(cls, "weight");
     property<&RestShape::root_weight, -1>(cls, "root_weight");
+    cls.def_prop_rw("root_shift", [](RestShape &rest) {
+        return Doubles(rest.root_shift.data(), {size_t(rest.S), 2}, nb::find(rest));
+    }, &assign<&RestShape::root_shift, 0>);
     property<&RestShape::held, 0>(cls, "held");
     property<&RestShape::offset, 0>(cls, "offset");
     m.def("rest_shape", &rest_shape, nb::arg("points"), nb::arg("mass_per_length"), nb::arg("bending"),

@@ -135,15 +135,15 @@ void scatter(const Vec3<Real> *from, T *target, int count, const BlockIndex<Real
     }
 }
 
-/// The bend that a clamped root keeps: the second segment seen in the frame of the first, at rest.
+/// The bend that a clamped root keeps: the second segment seen in the frame of the first, at rest, and its shift.
 template <class Real> void derive_root(Block<Real> &b) {
     Vec3<Real> d[2];
     for (int j = 0; j < 2; ++j) {
         const Vec3<Real> edge = b.anchor[j + 1] - b.anchor[j];
         d[j] = inverse_root<Real>(dot(edge, edge)) * edge;
     }
-    b.root_bend[0] = dot(d[1], b.director[0]);
-    b.root_bend[1] = dot(d[1], cross(d[0], b.director[0]));
+    b.root_bend[0] += dot(d[1], b.director[0]);
+    b.root_bend[1] += dot(d[1], cross(d[0], b.director[0]));
     const Mask<Real> by_head = (b.free[0] + b.free[1] + b.hand[0] + b.hand[1]) < Real(1);
     b.root_weight = select<Real>(by_head, b.root_weight, splat(Real(0)));
     b.clamped = any<Real>(b.root_weight > 0);
@@ -197,6 +197,7 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
     const Lanes<Real> one = splat(Real(1));
     b.k_ratio = select<Real>(b.k_kappa > 0, b.k_kappa_2 / b.k_kappa, one);
     b.inverse_ratio = select<Real>(b.k_kappa_2 > 0, b.k_kappa / b.k_kappa_2, one);
+    gather<Real>(b.root_bend, rest.root_shift.data(), 2, 2, strand);
     gather<Real>(&b.root_weight, rest.root_weight.data(), 1, 1, strand);
     b.root_kappa = square_root<Real>(b.k_kappa), b.root_kappa_2 = square_root<Real>(b.k_kappa_2);
     b.root_tau = square_root<Real>(b.k_tau);

@@ -28,6 +28,7 @@ struct RestShape {
     std::vector<double> dihedral;            // (S, P-3) [rad]
     std::vector<double> ratio, weight;       // (S, P-3) [1], [N m]
     std::vector<double> root_weight;         // (S,) [N m], see root.hpp
+    std::vector<double> root_shift;          // (S, 2): u at rest against the groom's
     std::vector<uint8_t> held;               // (S, P): 0 free, 1 by the head, 2 by the hand
     std::vector<double> offset;              // (S, P) [m]
     std::vector<double> directors, strain;   // (S, P-1, 3); (S, P-2, 3) [1, 1, rad], "kirchhoff"

@@ -1,7 +1,8 @@
 """Sag-free start: a rest shape that holds the groomed guides under gravity, instead of the groom itself.
 
 Hair was groomed as it hangs, so its rest shape is another one. The kernel finds it exactly, and how much stiffer a guide
-has to be for the groom to be stable (statics.hpp, stability.hpp, sag_free.hpp). It holds at the head's first pose,
+has to be for the groom to be stable (statics.hpp, stability.hpp, sag_free.hpp; for curls of torsion "rotor" see
+sag_free_curls). It holds at the head's first pose,
 without wind and without hair on hair. Where a guide leans on the head, its contact offset becomes the groomed distance,
 so that the two start in touch. Points groomed below the skin come out of it, and move their guides.
 """
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from pipeline import kernels
 from pipeline.config.schema import SagFree, Simulate
 from pipeline.errors import InputError
+from pipeline.simulate import sag_free_curls as curls
 
 _NEAR = 2e-3  # [m] the head carries points up to this distance from the skin,
 _ABOVE = 1e-3  # [m] and up to this much above their contact offset
@@ -78,34 +80,39 @@ class Start:
 
 
 def hold_groom(
-    rest: kernels.RestShape,
-    field: kernels.DistanceField | None,
-    gravity: tuple[float, float, float],
-    poses: _Vectors,
-    options: SagFree,
+    rest: kernels.RestShape, field: kernels.DistanceField | None, simulate: Simulate, poses: _Vectors
 ) -> Start:
-    """Change strains, stiffness and contact offsets of a rest shape so that its points are at rest.
+    """Change rest shape, stiffness and contact offsets so that the points are at rest, as far as that can be.
 
-    Gravity [m/s^2] and `rest.load` act in the world, in which the roots have these poses (G, 4, 4), or (1, 4, 4) where
-    all go with the head. Guides without a clamped
-    root keep the groom as their rest shape.
+    Gravity and `rest.load` act in the world, in which the roots have these poses (G, 4, 4), or (1, 4, 4) where all go
+    with the head. Guides without a clamped root keep the groom as their rest shape. Raises InputError for torsion
+    "rotor" when a guide has no sag-free rest shape.
     """
     turn = poses[:, :3, :3]
-    weight = (np.array(gravity) @ turn)[:, None]
+    weight = (np.array(simulate.gravity) @ turn)[:, None]
     load = np.ascontiguousarray(rest.mass[..., None] * weight + rest.load @ turn)
     distance, normal = _head(rest, field)
     free, outside = rest.held == 0, distance >= 0
-    offset = np.where(free & outside, np.minimum(rest.offset, distance), rest.offset)
-    supported = free & outside & (distance <= np.maximum(_NEAR, offset + _ABOVE))
-    normal = np.where(supported[..., None], normal, 0.0)
+    rest.offset = np.where(free & outside, np.minimum(rest.offset, distance), rest.offset)
+    below = int((free & ~outside).any(axis=1).sum())
+    if simulate.torsion == "rotor":
+        return _hold_curls(rest, load, simulate.sag_free, below)
+    supported = free & outside & (distance <= np.maximum(_NEAR, rest.offset + _ABOVE))
+    return _hold_rods(
+        rest, load, simulate.sag_free, below, (distance, np.where(supported[..., None], normal, 0.0))
+    )
 
+
+def _hold_rods(
+    rest: kernels.RestShape, load: _Vectors, options: SagFree, below: int, support: tuple[_Vectors, _Vectors]
+) -> Start:
+    distance, normal = support
     found = kernels.sag_free(rest, load, normal, options.margin, options.max_factor, options.lean_above)
     carried = found.reaction > 0
-    rest.offset = np.where(carried, distance, offset)
+    rest.offset = np.where(carried, distance, rest.offset)
     rest.strain = found.strain
     for name in ("bending", "bending_2", "twisting"):
         setattr(rest, name, getattr(rest, name) * found.factor)
-
     report = Report(
         guides=len(distance),
         residual=net_force(rest, load + found.reaction[..., None] * normal, found.tension),
@@ -114,9 +121,30 @@ def hold_groom(
         over_max_factor=int((found.needed > found.factor).sum()),
         leaning=int(carried.any(axis=1).sum()),
         hinged=int((~_clamped(rest)).sum()),
-        below_skin=int((free & ~outside).any(axis=1).sum()),
+        below_skin=below,
     )
     return Start(found.tension.copy(), carried.astype(np.uint8), report)
+
+
+def _hold_curls(rest: kernels.RestShape, load: _Vectors, options: SagFree, below: int) -> Start:
+    factor, held = curls.hold_curls(rest, load, options.margin, options.max_factor)
+    if not held.all():
+        raise InputError(
+            f'simulate.rest: "sag_free" cannot hold {int((~held).sum())} of {len(held)} guides with simulate.torsion = '
+            f'"rotor", the first of them guide {int(np.argmin(held))}: its torsion acts on bends, and straight parts '
+            'have none to be held sideways by; set simulate.torsion = "kirchhoff", or simulate.rest = "auto"'
+        )
+    report = Report(
+        guides=len(held),
+        residual=curls.net_force(rest, load, held),
+        stiffened=int((factor > 1).sum()),
+        largest_factor=float(factor.max(initial=1.0)),
+        over_max_factor=0,
+        leaning=0,
+        hinged=0,
+        below_skin=below,
+    )
+    return Start(curls.tension(rest, load), np.zeros(held.shape + load.shape[1:2], np.uint8), report)
 
 
 def net_force(rest: kernels.RestShape, load: _Vectors, tension: _Vectors) -> float:

@@ -175,7 +175,7 @@ class Simulation:
             np.ascontiguousarray(moved, precision), np.ascontiguousarray(directors, precision)
         )
         if wanted(self.simulate, self.rest):
-            start = hold_groom(self.rest, self.field, self.simulate.gravity, each, self.simulate.sag_free)
+            start = hold_groom(self.rest, self.field, self.simulate, each)
             state.tension[:], state.contact[:] = start.tension, start.contact
             self.sag_free = start.report
         return state

@@ -65,8 +65,7 @@ def _ascending(frames: tuple[Keyframe, ...]) -> tuple[Keyframe, ...]:
 
 _CANNOT_HOLD = {
     "none": "without torsion nothing holds a curl sideways",
-    "frenet": "curvature and torsion alone cannot hold a straight part sideways, nor a strand from turning about its root",
-    "rotor": "curvature and torsion alone cannot hold a straight part sideways, nor a strand from turning about its root",
+    "frenet": "its torsion does not keep a curl from turning about its root",
 }
 
 Keyframes = Annotated[tuple[Keyframe, ...], AfterValidator(_ascending)]
@@ -128,7 +127,7 @@ class Simulate(Section):
     torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "kirchhoff"
     """Torsion model: "kirchhoff" (material frames), "rotor" (4-point), "frenet" (the lecture's, regularised) or "none"."""
     rest: Literal["auto", "groom", "sag_free"] = "auto"
-    """Rest shape: the "groom" itself, which then sags under gravity; "sag_free", one that holds the groom (torsion "kirchhoff"); or "auto", sag-free where that can be."""
+    """Rest shape: the "groom" itself, which then sags under gravity; "sag_free", one that holds the groom (torsion "kirchhoff", or "rotor" for curls); or "auto", sag-free for "kirchhoff" where that can be."""
     sag_free: SagFree = SagFree()
     """How stable a sag-free groom is made."""
     relaxation: Literal["newton", "sweep"] = "newton"
@@ -173,7 +172,7 @@ class Simulate(Section):
     @classmethod
     def _torsion_holds_it(cls, rest: str, info: ValidationInfo) -> str:
         torsion = info.data.get("torsion", "kirchhoff")
-        if rest == "sag_free" and torsion != "kirchhoff":
+        if rest == "sag_free" and torsion in _CANNOT_HOLD:
             raise ValueError(
                 f'"sag_free" needs simulate.torsion = "kirchhoff": {_CANNOT_HOLD[torsion]}; or take "auto"'
             )
