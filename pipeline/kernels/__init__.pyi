@@ -255,6 +255,7 @@ class StepSettings:
 
     dt: float  # 1/240 s
     theta: float  # 0.6: implicitness, 0.5 .. 1
+    look_ahead: float  # 0 rad: linearise ahead of the step, but turn no segment by more; 0 is off, 0.3 is second order
     gravity: tuple[float, float, float]  # (0, -9.81, 0) [m/s^2]
     damping: float  # 3e-3 s: beta, internal
     torsion: Literal["kirchhoff", "rotor", "frenet", "none"]  # "rotor"

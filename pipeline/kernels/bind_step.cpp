@@ -83,6 +83,7 @@ static State at_rest(const Reals &points, const std::optional<Reals> &directors)
 static void check_settings(const StepSettings &s) {
     require(s.dt > 0 && std::isfinite(s.dt), "settings: dt must be positive");
     require(s.theta >= 0.5 && s.theta <= 1, "settings: theta must be from 0.5 to 1");
+    require(s.look_ahead >= 0 && s.look_ahead <= 1, "settings: look_ahead must be from 0 to 1");
     require(s.tolerance > 0, "settings: tolerance must be positive");
     require(s.damping >= 0 && s.friction >= 0, "settings: damping and friction must not be negative");
     require(s.drag >= 0 && s.drag_speed >= 0 && s.drag_along >= 0, "settings: drag must not be negative");
@@ -245,6 +246,7 @@ static void bind_settings(nb::module_ &m) {
     cls.def(nb::init<>())
         .def_rw("dt", &StepSettings::dt)
         .def_rw("theta", &StepSettings::theta)
+        .def_rw("look_ahead", &StepSettings::look_ahead)
         .def_rw("damping", &StepSettings::damping)
         .def_rw("tolerance", &StepSettings::tolerance)
         .def_rw("friction", &StepSettings::friction)

@@ -20,6 +20,8 @@ template <class Real> struct Edges {
     Vec3<Real> *d, *F;
     Lanes<Real> *il;
     Lanes<Real> *D_theta; // gradient by a turn of the director
+    const Vec3<Real> *ahead = nullptr; // how far the edges are ahead of the step's start (ahead.hpp); null: not
+    Lanes<Real> *ahead_s = nullptr;    // and s of the directors
 
     Edges(Arena &arena, int P)
         : d(arena.take<Vec3<Real>>(P)), F(arena.take<Vec3<Real>>(P)), il(arena.take<Lanes<Real>>(P)),
@@ -32,6 +34,7 @@ template <class Real> struct Edges {
             il[j] = inverse_root<Real>(dot(edge, edge));
             d[j] = il[j] * edge;
         }
+        ahead = nullptr;
     }
 
     /// The same; gradients start from zero.
@@ -76,6 +79,13 @@ template <class Real, int Count, int Reach> struct Squares {
             energy += Real(0.5) * moment * r[k];
         }
         return energy;
+    }
+
+    /// Residuals extrapolated back to the step's start, where the first edge is edge i.
+    RINGLET_INLINE void look_back(const Edges<Real> &edges, int i) {
+        if (!edges.ahead) return;
+        for (int k = 0; k < Count; ++k)
+            for (int j = 0; j < Reach; ++j) r[k] -= dot(g[k][j], edges.ahead[i + j]);
     }
 };
 

@@ -61,6 +61,7 @@ template <class Real> struct Equation {
     const StepSettings &settings;
     const Contacts<Real> &contacts;
     const Edges<Real> &edges;
+    const Vec3<Real> *m; // directors, where the edges are
     const Outside<Real> *outside = nullptr; // forces of other strands
 };
 
@@ -179,7 +180,7 @@ template <class Real, Torsion torsion> class Solver {
         Outer<Real> stretching;
         if (i + 1 < b.P) {
             stretching = stretch(b, eq.edges, i, eq.from.T[i], eq.step.dt, eq.settings.theta);
-            assembly.edge(0) = assembly.edge(0) + eq.from.T[i] * eq.edges.d[i];
+            assembly.edge(0) = assembly.edge(0) + tension(eq.edges, i, eq.from.T[i]);
         }
         if constexpr (turns) add_joint(eq, i, scale, stretching, assembly);
         else add_joints(eq, i, scale, stretching, assembly);
@@ -205,15 +206,17 @@ template <class Real, Torsion torsion> class Solver {
         const Block<Real> &b = eq.b;
         BendStiffness<Real> bending;
         if (i + 2 < b.P) {
-            const Bend<Real> bend(b, eq.edges, i + 1, scale);
+            Bend<Real> bend(b, eq.edges, i + 1, scale);
+            bend.look_back(eq.edges, i);
             bend.add_gradient(scale, &assembly.edge(0));
             bending = BendStiffness<Real>(bend);
+            bending.look_back(eq.edges, i, scale, &assembly.edge(0));
         }
         L g[torsion == Torsion::rotor ? 2 : 1][Reach]{};
         if constexpr (torsion == Torsion::rotor)
-            if (i + 3 < b.P) add_rows(Rotor<Real>(b, eq.edges, i + 1, scale), scale, assembly, g);
+            if (i + 3 < b.P) add_rows(eq, i, Rotor<Real>(b, eq.edges, i + 1, scale), scale, assembly, g);
         if constexpr (torsion == Torsion::frenet)
-            if (i + 4 < b.P) add_rows(Frenet<Real>(b, eq.edges, i + 2, scale), scale, assembly, g);
+            if (i + 4 < b.P) add_rows(eq, i, Frenet<Real>(b, eq.edges, i + 2, scale), scale, assembly, g);
         assembly.fill(g, [&](int row, int column, L &sum) RINGLET_ALWAYS {
             bending.add(row, column, sum);
             if (column < 3) sum += stretching.at(row, column);
@@ -221,15 +224,17 @@ template <class Real, Torsion torsion> class Solver {
     }
 
     template <int Count, int Edges>
-    RINGLET_INLINE static void add_rows(const Squares<Real, Count, Edges> &joint, const Scale<Real> &scale,
-                                        System &assembly, L (&g)[Count][Reach]) {
+    RINGLET_INLINE static void add_rows(const Equation<Real> &eq, int i, Squares<Real, Count, Edges> joint,
+                                        const Scale<Real> &scale, System &assembly, L (&g)[Count][Reach]) {
+        joint.look_back(eq.edges, i);
         joint.add_gradient(scale, &assembly.edge(0));
         write_rows(joint, g);
     }
 
     /// "rotor" at a clamped root; its director turns at a known rate [1/s].
     RINGLET_INLINE static void add_root(const Equation<Real> &eq, const Scale<Real> &scale, L rate, System &assembly) {
-        RootBend<Real> root(eq.b, eq.edges, eq.from.m[0], scale);
+        RootBend<Real> root(eq.b, eq.edges, eq.m[0], scale);
+        root.look_back(eq.edges, 0);
         L g[2][6];
         write_rows(root, g);
         for (int a = 0; a < 2; ++a) {
@@ -246,9 +251,10 @@ template <class Real, Torsion torsion> class Solver {
         const Block<Real> &b = eq.b;
         RodRows<Real> rows{};
         if (i + 2 < b.P) {
-            const Joint<Real> q(eq.edges.d[i], eq.edges.d[i + 1], eq.from.m[i], eq.from.m[i + 1], eq.from.twist[i + 1]);
+            const Joint<Real> q(eq.edges.d[i], eq.edges.d[i + 1], eq.m[i], eq.m[i + 1], eq.from.twist[i + 1]);
             add_joint_gradient(Moments<Real>(b, i + 1, q), q, eq.edges, i + 1, &assembly.edge(0), &assembly.fourth(0));
             rows = RodRows<Real>(b, eq.edges, i + 1, q, scale);
+            rows.look_back(eq.edges, i, scale, &assembly.edge(0), &assembly.fourth(0));
         }
         assembly.fill(rows.row, [&](int row, int column, L &sum) RINGLET_ALWAYS {
             if (row % 4 == 3 && column % 4 == 3) sum += rows.turning[row / 4] * rows.turning[column / 4];

@@ -182,6 +182,24 @@ template <class Real> struct RodRows {
         least[0] = held * il0 * il0, least[1] = held * il1 * il1;
     }
 
+    /// What the stiffness adds to the gradient by the two edges, F, and by turns, extrapolated back to the step's start.
+    RINGLET_INLINE void look_back(const Edges<Real> &edges, int i, const Scale<Real> &scale, Vec3<Real> *F,
+                                  L *D_theta) const {
+        if (!edges.ahead) return;
+        for (const L(&g)[8] : row) {
+            const Vec3<Real> g0 = {g[0], g[1], g[2]}, g1 = {g[4], g[5], g[6]};
+            const L moment = scale.inverse * (dot(g0, edges.ahead[i]) + dot(g1, edges.ahead[i + 1]) +
+                                              g[3] * edges.ahead_s[i] + g[7] * edges.ahead_s[i + 1]);
+            F[0] = F[0] - moment * g0, F[1] = F[1] - moment * g1;
+            D_theta[0] -= moment * g[3] * reciprocal<Real>(edges.il[i]);
+            D_theta[1] -= moment * g[7] * reciprocal<Real>(edges.il[i + 1]);
+        }
+        const L common = scale.inverse / scale.undamped *
+                         (turning[0] * edges.ahead_s[i] + turning[1] * edges.ahead_s[i + 1]);
+        D_theta[0] -= common * turning[0] * reciprocal<Real>(edges.il[i]);
+        D_theta[1] -= common * turning[1] * reciprocal<Real>(edges.il[i + 1]);
+    }
+
   private:
     RINGLET_INLINE void set(int r, Vec3<Real> D0, Vec3<Real> D1, L s0, L s1) {
         L *g = row[r];

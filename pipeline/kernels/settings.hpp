@@ -13,6 +13,7 @@ struct StepSettings {
     double dt = 1.0 / 240;             // [s]
     double theta = 0.6;                // implicitness, 0.5 .. 1
     double gravity[3] = {0, -9.81, 0}; // [m/s^2]
+    double look_ahead = 0;             // [rad] an edge is looked ahead by no more; 0: not at all (ahead.hpp)
     double damping = 3e-3;             // [s] beta
     Torsion torsion = Torsion::rotor;
     Relaxation relaxation = Relaxation::newton;

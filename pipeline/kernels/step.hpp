@@ -8,7 +8,7 @@
 #include "bow.hpp"
 #include "implicit.hpp"
 #include "relaxation.hpp"
-#include "twist.hpp"
+#include "ahead.hpp"
 
 #include <memory>
 #include <vector>
@@ -39,14 +39,14 @@ template <class Real> class Stepper {
 
     Stepper(Arena &arena, int P, const StepSettings &settings, const DistanceField *field)
         : block(arena, P), now(arena, P), contacts(arena, P), settings_(settings), field_(field), next_(arena, P),
-          edges_(arena, P), lengths_(arena, P), directors_(arena, P), solvers_(arena, P, settings.torsion),
+          edges_(arena, P), lengths_(arena, P), directors_(arena, P), ahead_(arena, P), solvers_(arena, P, settings.torsion),
           f_(arena.take<Vec3<Real>>(P)), u_(arena.take<Vec3<Real>>(P)), star_(arena.take<Vec3<Real>>(P)) {
         for (int depth = 0; depth < 2 * kHalvings; ++depth) halves_.emplace_back(arena, P);
     }
 
     /// Bytes that a Stepper takes from its arena.
     static size_t bytes(int P) {
-        constexpr size_t pivots = 2 * (4 * 15 + 8), motions = 2 + 2 * kHalvings, points = 112;
+        constexpr size_t pivots = 2 * (4 * 15 + 8), motions = 2 + 2 * kHalvings, points = 128;
         return sizeof(L) * ((pivots + 12 * motions + points) * P + 4096);
     }
 
@@ -80,7 +80,9 @@ template <class Real> class Stepper {
     Edges<Real> edges_;
     Lengths<Real> lengths_;
     Directors<Real> directors_;
+    Ahead<Real> ahead_;
     Solvers<Real> solvers_;
+    const Vec3<Real> *start_ = nullptr; // directors where the edges are
     Vec3<Real> *f_, *u_, *star_; // forces, velocities of travel, points before the rounds
     M hopeless_{};               // lanes that failed in the shortest step too: not halved again in this one
 
@@ -142,7 +144,7 @@ template <class Real> class Stepper {
         const Real dt = Real(interval.dt);
         const HeadStep<Real> head(field_, interval);
         move_held(interval, from, to);
-        edges_.follow(from.x, block.P);
+        start_ = linearise(from, dt);
         hold_directors(interval, from, to);
         contacts.find_rows(block, head, from, dt);
         if (settings_.is_explicit) explicit_velocities(interval, from, to);
@@ -157,8 +159,15 @@ template <class Real> class Stepper {
         }
         M failed = relax(head, from, to, theta() * dt * dt, wanted);
         finish(head, from, to, dt);
-        if (has_directors()) directors_.follow(block, edges_, dt, from, to);
+        if (has_directors()) directors_.follow(block, edges_, start_, dt, from, to);
         return failed;
+    }
+
+    /// Sets the edges that forces and stiffness are taken at; their directors.
+    const Vec3<Real> *linearise(const Motion<Real> &from, Real dt) {
+        edges_.follow(from.x, block.P);
+        if (settings_.is_explicit || settings_.look_ahead == 0) return from.m;
+        return ahead_.look(block, from, u_, theta() * dt, Real(settings_.look_ahead), has_directors(), directors_, edges_);
     }
 
     Real theta() const { return settings_.is_explicit ? Real(1) : Real(settings_.theta); }
@@ -176,13 +185,13 @@ template <class Real> class Stepper {
 
     /// Held directors go with the head or the hand; of the others only "kirchhoff" takes care.
     void hold_directors(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
-        directors_.hold(block, edges_, interval, from, to);
+        directors_.hold(block, edges_, start_, interval, from, to);
         if (!has_directors()) std::copy_n(from.twist, block.P, to.twist);
     }
 
     /// Banded solve; rows that would pull are dropped and the system is solved again.
     void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
-        const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, outside};
+        const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, start_, outside};
         for (int again = 0;; ++again) {
             ++tally.solves;
             solvers_.solve(equation, again > 0, {u_, directors_.spin});

@@ -33,6 +33,12 @@ template <class Real> struct Outer {
         entries[3] = wa.y * a.y + diagonal, entries[4] = wa.y * a.z, entries[5] = wa.z * a.z + diagonal;
     }
 
+    friend RINGLET_INLINE Vec3<Real> operator*(const Outer &a, Vec3<Real> b) {
+        return {a.entries[0] * b.x + a.entries[1] * b.y + a.entries[2] * b.z,
+                a.entries[1] * b.x + a.entries[3] * b.y + a.entries[4] * b.z,
+                a.entries[2] * b.x + a.entries[4] * b.y + a.entries[5] * b.z};
+    }
+
     RINGLET_INLINE Lanes<Real> at(int row, int column) const {
         const int low = row < column ? row : column, high = row < column ? column : row;
         return entries[triangle(3, low) + high];
@@ -61,6 +67,14 @@ template <class Real> struct BendStiffness {
         write_rows(bend, g);
     }
 
+    /// What the stiffness across adds to the gradient F by the two edges, extrapolated back to the step's start.
+    RINGLET_INLINE void look_back(const Edges<Real> &edges, int i, const Scale<Real> &scale, Vec3<Real> *F) const {
+        if (!edges.ahead) return;
+        const Vec3<Real> back = (scale.inverse / scale.undamped) * (across * (edges.ahead[i] - edges.ahead[i + 1]));
+        F[0] = F[0] - back;
+        F[1] = F[1] + back;
+    }
+
     RINGLET_INLINE void add(int row, int column, Lanes<Real> &sum) const {
         if (column >= 6) return;
         const Lanes<Real> open = across.at(row % 3, column % 3);
@@ -76,6 +90,12 @@ RINGLET_INLINE Outer<Real> stretch(const Block<Real> &b, const Edges<Real> &edge
     const Real theta_dt = Real(theta * dt);
     const Lanes<Real> tight = (theta_dt * theta_dt) * b.per_mass * maximum<Real>(T, splat(Real(0))) * edges.il[j];
     return {edges.d[j], theta_dt * Real(dt) * stretch_stiffness(b, T, j, Real(dt)) - tight, tight};
+}
+
+/// What pulls the ends of segment j together at the step's start: the tension, turned back where edges are ahead.
+template <class Real> RINGLET_INLINE Vec3<Real> tension(const Edges<Real> &edges, int j, Lanes<Real> T) {
+    if (!edges.ahead) return T * edges.d[j];
+    return T * edges.d[j] - turning(maximum<Real>(T, splat(Real(0))) * edges.ahead[j], edges.d[j], edges.il[j]);
 }
 
 } // namespace ringlet

@@ -91,9 +91,9 @@ template <class Real> class Directors {
     }
 
     /// A director is held where both ends of its segment are, and goes rigidly with them: the directors of held
-    /// segments at the end of the step, and their spin. `edges` are those before the step.
-    void hold(const Block<Real> &b, const Edges<Real> &edges, const Interval<Real> &interval, const Motion<Real> &from,
-              Motion<Real> &to) {
+    /// segments at the end of the step, and their spin. `start` are the directors of the edges.
+    void hold(const Block<Real> &b, const Edges<Real> &edges, const Vec3<Real> *start, const Interval<Real> &interval,
+              const Motion<Real> &from, Motion<Real> &to) {
         const Rigid<Real> head(interval.poses.head[1]), hand(interval.poses.hand[1]);
         const Real dt = Real(interval.dt);
         for (int j = 0; j < b.P - 1; ++j) {
@@ -103,22 +103,25 @@ template <class Real> class Directors {
             const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = inverse_root<Real>(dot(edge, edge)) * edge;
             const Vec3<Real> by_head = head.turn(interval.skin.turn(b.director[j])), by_hand = hand.turn(b.director[j]);
             const Vec3<Real> m = squared(select(b.hand[j] > 0, by_hand, by_head), t);
-            const Vec3<Real> before = squared(transport(from.m[j], edges.d[j], t), t);
+            const Vec3<Real> before = squared(transport(start[j], edges.d[j], t), t);
             const HalfAngle<Real> half(dot(before, m), dot(cross(before, m), t));
             to.m[j] = select(b.turns[j] > 0, to.m[j], m);
             spin[j] = (1 - b.turns[j]) * half.angle / (dt * edges.il[j]);
         }
     }
 
-    /// Free directors at the end of the step, and the twist of all joints.
-    void follow(const Block<Real> &b, const Edges<Real> &edges, Real dt, const Motion<Real> &from, Motion<Real> &to) {
+    /// Free directors at the end of the step, and the twist of all joints. `start` are the directors of the edges.
+    void follow(const Block<Real> &b, const Edges<Real> &edges, const Vec3<Real> *start, Real dt,
+                const Motion<Real> &from, Motion<Real> &to) {
         for (int j = 0; j < b.P - 1; ++j) {
             const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = inverse_root<Real>(dot(edge, edge)) * edge;
-            const Vec3<Real> m = squared(transport(from.m[j], edges.d[j], t), t);
-            to.m[j] = select(b.turns[j] > 0, turned(m, t, half_turn<Real>(dt * edges.il[j] * spin[j])), to.m[j]);
+            const Vec3<Real> m = squared(transport(start[j], edges.d[j], t), t);
+            const L ahead = edges.ahead ? edges.ahead_s[j] : L{};
+            to.m[j] = select(b.turns[j] > 0, turned(m, t, half_turn<Real>(edges.il[j] * (dt * spin[j] - ahead))), to.m[j]);
             t_[j] = t;
+            to.twist[j] = from.twist[j];
         }
-        relax(b, from, to);
+        relax(b, t_, to.m, to.twist, nullptr);
     }
 
     /// The directors of lanes whose strand only moved on: they keep their directors.
@@ -133,19 +136,16 @@ template <class Real> class Directors {
         }
     }
 
-  private:
-    Vec3<Real> *t_;
-    L *inverse_, *upper_, *right_; // of the eliminated tridiagonal matrix
-
-    /// One Newton step of dE/dtheta = 0 at the new points.
-    void relax(const Block<Real> &b, const Motion<Real> &from, Motion<Real> &to) {
+    /// One Newton step of dE/dtheta = 0 for directors m at the tangents t; `twist` comes in as that before, and `by`,
+    /// unless null, tells how far directors have turned.
+    void relax(const Block<Real> &b, const Vec3<Real> *t, Vec3<Real> *m, L *twist, L *by) {
         const L none = splat(Real(0)), one = splat(Real(1));
         L diagonal = none, force = none, coupling = none; // of segment j: from the joint before it
         for (int j = 0; j < b.P - 1; ++j) {
             L next_diagonal = none, next_force = none, next_coupling = none;
             if (j + 1 < b.P - 1) {
                 const int i = j + 1;
-                const Joint<Real> q(t_[j], t_[i], to.m[j], to.m[i], from.twist[i]);
+                const Joint<Real> q(t[j], t[i], m[j], m[i], twist[i]);
                 const Moments<Real> at(b, i, q);
                 const L both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1), per_length = b.inverse_dl[i];
                 const L g = Real(0.25) * maximum<Real>(turning_stiffness(b, i, q), none);
@@ -154,7 +154,7 @@ template <class Real> class Directors {
                 next_force = -both - at.Q;
                 diagonal += next_diagonal;
                 force += at.Q - both;
-                to.twist[i] = q.twist;
+                twist[i] = q.twist;
             }
             const Mask<Real> turns = b.turns[j] > none;
             const L factor = j > 0 ? coupling * inverse_[j - 1] : none;
@@ -167,11 +167,16 @@ template <class Real> class Directors {
         for (int j = b.P - 2; j >= 0; --j) {
             after = (right_[j] - upper_[j] * after) * inverse_[j];
             const L half = half_turn<Real>(after), turn = 2 * arc_tangent<Real>(half);
-            to.m[j] = turned(to.m[j], t_[j], half);
-            if (j + 1 < b.P - 1) to.twist[j + 1] += turn_after - turn;
+            m[j] = turned(m[j], t[j], half);
+            if (j + 1 < b.P - 1) twist[j + 1] += turn_after - turn;
+            if (by) by[j] = turn;
             turn_after = turn;
         }
     }
+
+  private:
+    Vec3<Real> *t_;
+    L *inverse_, *upper_, *right_; // of the eliminated tridiagonal matrix
 };
 
 } // namespace ringlet

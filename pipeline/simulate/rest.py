@@ -11,6 +11,8 @@ _STRAIGHTEST_CURL = (
     20.0  # [1/m]; wavy hair bends with radii up to 5 cm, the torsion of what bends less is noise
 )
 
+_LOOK_AHEAD = 0.3  # [rad] that a segment is expected to turn at most
+
 # The drag of air on an isolated fibre of 80 um and 1300 kg/m^3, c = 11 + 15 |u| [1/s], fitted to a cylinder's
 # C_D = 1 + 10 Re^(-2/3); per mass it falls as 1 / (width density).
 _DRAG, _DRAG_SPEED, _FITTED_WIDTH, _FITTED_DENSITY = 11.0, 15.0, 80e-6, 1300.0
@@ -49,6 +51,7 @@ def step_settings(simulate: Simulate) -> kernels.StepSettings:
     settings = kernels.StepSettings()
     settings.dt = 1 / (simulate.fps * simulate.substeps)
     settings.theta = simulate.theta
+    settings.look_ahead = _LOOK_AHEAD if simulate.look_ahead else 0.0
     settings.gravity = simulate.gravity
     settings.damping = simulate.hair.damping
     settings.torsion = simulate.torsion

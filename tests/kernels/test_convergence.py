@@ -1,5 +1,7 @@
 """What steps of different length have in common: one motion in the limit, and rest after a blow."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from conftest import helix
@@ -10,11 +12,13 @@ from pipeline import kernels
 every_model = pytest.mark.parametrize("torsion", ["kirchhoff", "rotor"])
 
 
-def swing(strand: Points, rate: int, torsion: str) -> Points:
+def swing(strand: Points, rate: int, torsion: str, **values: Any) -> Points:
     """Points after 0.2 s of fall and turn, with the default damping and drag."""
     rest, state = shape(strand[None]), kernels.at_rest(strand[None])
     poses = drive(rate // 5, lambda k: turned((0, 1, 0), 0.5 * np.sin(4 * np.pi * k / rate) ** 2))
-    kernels.advance(state, rest, None, poses, settings(dt=1 / rate, torsion=torsion, tolerance=1e-8))
+    kernels.advance(
+        state, rest, None, poses, settings(dt=1 / rate, torsion=torsion, tolerance=1e-8, **values)
+    )
     return np.asarray(state.points[0])
 
 
@@ -68,3 +72,35 @@ def test_internal_damping_does_not_brake_a_swinging_rope(torsion: str) -> None:
         speeds.append(fastest)
     print(f"{torsion}: fastest swing back with damping over without {speeds[1] / speeds[0]:.4f}")
     assert speeds[1] == pytest.approx(speeds[0], rel=0.02)
+
+
+@every_model
+@pytest.mark.parametrize("hair", ["wavy", "curly"])
+def test_looking_ahead_is_worth_shorter_steps(hair: str, torsion: str) -> None:
+    """Linearised where it is expected to be, a step of 1/240 s is nearer to the limit than one of 1/960 s."""
+    strand = {"wavy": helix(0.02, 0.12, 0.25, 32), "curly": helix(0.008, 0.02, 0.25, 32)}[hair]
+    ahead = {"look_ahead": 0.3, "theta": 0.55}
+    exact = swing(strand, 15360, torsion, look_ahead=0.3, theta=0.5)
+    errors = {}
+    for name, values in {"from the start": {"theta": 0.55}, "ahead": ahead}.items():
+        errors[name] = [
+            np.linalg.norm(swing(strand, rate, torsion, **values) - exact, axis=1).max()
+            for rate in (60, 240, 960)
+        ]
+        print(f"{hair}, {torsion}, {name}: " + ", ".join(f"{e * 1e3:.2f}" for e in errors[name]) + " mm")
+    assert errors["ahead"][1] < 0.3 * errors["from the start"][1]
+    assert errors["ahead"][1] < errors["from the start"][2]
+
+
+@every_model
+def test_looking_ahead_does_not_change_what_rests(torsion: str) -> None:
+    strand = helix(0.008, 0.02, 0.25, 32)
+    ends = []
+    for look_ahead in (0.0, 0.3):
+        rest, state = shape(strand[None]), kernels.at_rest(strand[None])
+        step = settings(torsion=torsion, look_ahead=look_ahead, drag=20.0, damping=0.01, tolerance=1e-10)
+        kernels.advance(state, rest, None, drive(16 * 240), step)
+        ends.append(state.points[0])
+    difference = np.abs(ends[1] - ends[0]).max()
+    print(f"{torsion}: shapes at rest differ by {difference:.1e} m")
+    assert difference <= 1e-9

@@ -55,11 +55,21 @@ def test_result_does_not_depend_on_the_number_of_threads(precision: type, torsio
 
 
 @pytest.mark.parametrize(
-    ("relaxation", "torsion"), [("newton", "rotor"), ("sweep", "rotor"), ("newton", "kirchhoff")]
+    ("relaxation", "torsion", "look_ahead"),
+    [
+        ("newton", "rotor", 0.0),
+        ("sweep", "rotor", 0.0),
+        ("newton", "kirchhoff", 0.0),
+        ("newton", "kirchhoff", 0.3),
+    ],
 )
-def test_a_strand_moves_the_same_alone_and_among_others(relaxation: str, torsion: str) -> None:
+def test_a_strand_moves_the_same_alone_and_among_others(
+    relaxation: str, torsion: str, look_ahead: float
+) -> None:
     """Long undamped steps, so that lanes converge in different rounds (for halving, see the strand given up alone)."""
-    step = settings(dt=1 / 60, relaxation=relaxation, torsion=torsion, **STILL, damping=0.0)
+    step = settings(
+        dt=1 / 60, relaxation=relaxation, torsion=torsion, look_ahead=look_ahead, **STILL, damping=0.0
+    )
     rest, state = curly_head(19)
     alone_points = np.ascontiguousarray(rest.points[7:8])
     alone_rest, alone = shape(alone_points), kernels.at_rest(alone_points.astype(np.float32))

@@ -124,6 +124,8 @@ class Simulate(Section):
     """Precision of the guides: "float32" is twice as fast, but fails on short strands of many points (spacing below 1 mm)."""
     theta: Annotated[float, Field(ge=0.5, le=1)] = 0.6
     """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond."""
+    look_ahead: bool = False
+    """Linearise where hair is expected in the middle of a step: a tenth of the error, for steps of 1/120 s and shorter."""
     torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "kirchhoff"
     """Torsion model: "kirchhoff" (material frames), "rotor" (4-point), "frenet" (the lecture's, regularised) or "none"."""
     rest: Literal["auto", "groom", "sag_free"] = "auto"
