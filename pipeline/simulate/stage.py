@@ -11,7 +11,7 @@ from pipeline import cache
 from pipeline.cache.expansion import body_frames, distance_field
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
-from pipeline.simulate.plots import draw_energies
+from pipeline.simulate.diagnostics import draw, lines
 from pipeline.simulate.sag_free import tip_drift
 from pipeline.simulate.stepper import Guides, Simulation, SimulationDiverged
 
@@ -40,7 +40,9 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
     record = {"sag_free": _sag_free(simulation, segments, guides)} if simulation.sag_free else {}
     segments.merge(provenance(config, "simulate") | record, config.simulate.fps)
     with cache.open_guides(experiment.guides) as written:
-        draw_energies(experiment.folder / "energy.png", written.diagnostics, written.fps)
+        for line in lines(written.diagnostics, config.simulate):
+            say("simulate", line)
+        draw(experiment.folder / "diagnostics.png", written.diagnostics, config.simulate)
 
 
 def run(simulation: Simulation, start: int = 0) -> Iterator[cache.Frame]:

@@ -182,11 +182,14 @@ class Simulation:
 
 
 def _summary(report: kernels.Report | None) -> dict[str, float]:
+    """What a frame's steps were like: worst strain, penetration [m] and rounds; means a step; halvings in all."""
     return {
         "strain": report.strain if report else 0.0,
         "penetration": report.depth if report else 0.0,
-        "relaxation": report.rounds if report else 0.0,
+        "rounds": report.rounds if report else 0.0,
+        "rounds_worst": float(report.rounds_max) if report else 0.0,
         "contacts": report.contacts if report else 0.0,
+        "solves": report.solves if report else 0.0,
         "halvings": float(report.halvings) if report else 0.0,
     }
 

@@ -244,13 +244,13 @@ def test_a_diverged_run_keeps_its_state(tmp_path: Path, monkeypatch: pytest.Monk
     assert not experiment.guides.exists()
 
 
-def test_the_energy_plot_is_reproducible(tmp_path: Path) -> None:
+def test_the_picture_of_a_run_is_reproducible(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     pictures = []
     for name in ("a", "b"):
         experiment = experiment_with_groom(tmp_path / name, swatch())
         stage.execute(CONFIG, experiment, "key")
-        pictures.append((experiment.folder / "energy.png").read_bytes())
+        pictures.append((experiment.folder / "diagnostics.png").read_bytes())
     assert pictures[0] == pictures[1]
     assert pictures[0].startswith(b"\x89PNG")
 
