@@ -38,7 +38,7 @@ def lines(figures: Figures, simulate: Simulate) -> list[str]:
     snaps = collapses(figures) / simulate.fps
     if len(snaps) and driven(simulate):
         first = f"; the first at {snaps[0]:.2f} s" + _shortening(simulate, snaps[0])
-        said.append(f"{len(snaps)} sudden collapses{first}")
+        said.append(f"{len(snaps)} sudden collapse{'' if len(snaps) == 1 else 's'}{first}")
     return said
 
 
@@ -81,15 +81,19 @@ def _energies(axes: Any, time: NDArray[np.floating], figures: Figures, simulate:
         if name == "gravity":
             energy = energy - energy[0]
         if weighty or name != "gravity":
-            label = "gravity, from the first frame" if name == "gravity" else name
+            label = {"gravity": "gravity, from the first frame", "torsion": _twist(simulate)}.get(name, name)
             axes.plot(time, energy, color=colour, label=label, linewidth=1.6)
     if driven(simulate):
         for index, frame in enumerate(collapses(figures)):
-            label = f"collapse{_shortening(simulate, time[frame])}" if index == 0 else None
-            axes.axvline(time[frame], color="black", linestyle=":", linewidth=1, label=label)
+            note = "" if index else f"collapse{_shortening(simulate, time[frame])}"
+            axes.axvline(time[frame], color="black", linestyle=":", linewidth=1, label=note)
     axes.set(ylabel="energy [µJ]", title="Energy of the guides")
     axes.grid(alpha=0.25)
     axes.legend(frameon=False, fontsize="small")
+
+
+def _twist(simulate: Simulate) -> str:
+    return "twist" if simulate.torsion == "kirchhoff" else "torsion"
 
 
 def _limits(axes: Any, time: NDArray[np.floating], figures: Figures, simulate: Simulate) -> None:
@@ -105,9 +109,16 @@ def _limits(axes: Any, time: NDArray[np.floating], figures: Figures, simulate: S
 
 
 def _work(axes: Any, time: NDArray[np.floating], figures: Figures) -> None:
-    names = {"rounds": "rounds, mean", "rounds_worst": "rounds, worst", "solves": "solves", "halvings": "halved"}
-    for (name, label), colour in zip(names.items(), ("#2c3e50", "#95a5a6", "#27ae60", "#c0392b"), strict=True):
-        if np.any(figures[name]):
+    names = {
+        "rounds": "rounds, mean",
+        "rounds_worst": "rounds, worst",
+        "solves": "solves",
+        "halvings": "halved",
+    }
+    for (name, label), colour in zip(
+        names.items(), ("#2c3e50", "#95a5a6", "#27ae60", "#c0392b"), strict=True
+    ):
+        if name == "rounds" or np.any(figures[name]):
             axes.plot(time, figures[name], color=colour, linewidth=1.2, label=label)
     axes.set(xlabel="time [s]", ylabel="a step (halved: a frame)", ylim=(0, None))
     axes.grid(alpha=0.25)
@@ -122,5 +133,7 @@ def _work(axes: Any, time: NDArray[np.floating], figures: Figures) -> None:
 def _shortening(simulate: Simulate, time: float) -> str:
     """How far the tips have been moved by then, in words."""
     times = [key.time for key in simulate.tips]
-    moved = [float(np.linalg.norm(np.subtract(key.position, simulate.tips[0].position))) for key in simulate.tips]
+    moved = [
+        float(np.linalg.norm(np.subtract(key.position, simulate.tips[0].position))) for key in simulate.tips
+    ]
     return f", tips moved by about {100 * float(np.interp(time, times, moved)):.1f} cm"

@@ -236,11 +236,14 @@ def test_a_diverged_run_keeps_its_state(tmp_path: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(Simulation, "next_frame", poisoned)
     with pytest.raises(
-        SimulationDiverged, match=r"guide 1 \(strand 1 of the groom; its state is in .*diverged\.h5"
+        SimulationDiverged,
+        match=r"guide 1 \(strand 1 of the groom; its state is in .*diverged\.h5\) diverged before frame 2;",
     ):
         stage.execute(CONFIG, experiment, "key")
     with cache.open(tmp_path / "diverged.h5", kind="state") as state:
         assert not np.isfinite(state["points"][1]).all()
+        assert np.isfinite(state["points"][0]).all()
+        assert state["step"][0] == CONFIG.simulate.substeps
     assert not experiment.guides.exists()
 
 
