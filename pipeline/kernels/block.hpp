@@ -1,6 +1,6 @@
 // One block of strands, a lane each: its state, its rest shape, and how arrays of strands are read and written.
 //
-// Notation (physics.md): x, v points and velocities; T tension of a segment; l its rest length; m mass of a point,
+// Notation: x, v points and velocities; T tension of a segment; l its rest length; m mass of a point,
 // here in units of the strand's mean mass m0 (mu = m/m0, w = m0/m; 0 where the point is held).
 #pragma once
 

@@ -1,7 +1,7 @@
 // Contact of strands with the head: rows in the solve, then pushes and Coulomb friction between length steps.
 //
-// Source: contact.md section 1 (the recommended scheme), steps a to d2. Notation: phi signed distance at the head's new
-// pose, h contact offset of the point, n world normal, g = phi - h gap, N contact force over the mean mass [m/s^2],
+// Steps a to d2 and e of docs/physics.md, "Contact with the head". Notation: phi signed distance at the head's new pose,
+// h contact offset of the point, n world normal, g = phi - h gap, N contact force over the mean mass [m/s^2],
 // s displacement that the contact force is worth [m], a 1 where the contact holds.
 // The distance tells how deep a point is and which way is out, but not on which side of a thin part it was. A point that
 // moves far relative to the head in a step is followed along its way (path.hpp); where that leads through the head, phi

@@ -1,6 +1,6 @@
 // Elastic energies of strands and their gradients: bending, and torsion "frenet" and "rotor".
 //
-// Source: KIST lecture "Hair Simulation 2" (Physically Based Animation, 2008); rotor: physics.md section 2.
+// Source: KIST lecture "Hair Simulation 2" (Physically Based Animation, 2008); rotor: docs/physics.md.
 // Notation: d_j unit edge of segment j, il its inverse length now, l and dl rest lengths; at point i
 //     c = d_i - d_{i-1},  e = d_i + d_{i-1},  kappa = 2 |c| / (dl |e|)
 // All energies are functions of unit edges only, so that they do not see stretch (with "dl fixed" in the lecture's

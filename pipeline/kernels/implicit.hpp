@@ -1,8 +1,9 @@
 // The linearly implicit step: one banded solve per strand for the velocity u at which its points travel.
 //
-// physics.md section 3 solves  [M (1 + theta dt c) + H] dv = dt [f + M g - c M (v - wind)] - H v / theta  with
-// H = theta dt (theta dt + beta) K. We solve for u = v + theta dv, which needs no product H v:
-//     [M (1 + theta dt c) + H] u = M v + theta dt [f + M (g + c wind)],      x* = x + dt u
+//     [ M (1 + theta dt c) + theta dt (theta dt + beta) K + theta dt dt K_s ] u = M v + theta dt [f + M (g + c wind)]
+//     x* = x + dt u,    u = v + theta dv
+// K bending and torsion, beta the internal damping, K_s stretch: see stiffness.hpp. Solved for u instead of dv, the
+// right side needs no product K v.
 // "kirchhoff" has s = l theta of every segment as a fourth unknown of its first point: no mass, its velocity from 0.
 // Everything is divided by the strand's mean mass m0. The tension T is carried: T += k_s dt d.(u_{j+1} - u_j).
 // Forces, matrix and elimination are one sweep over the points from the root: see banded.hpp.
@@ -16,7 +17,7 @@
 
 namespace ringlet {
 
-/// Air drag of a point: c_perp across the strand, c_par along it [1/s] (contact.md section 2).
+/// Air drag of a point: c_perp across the strand, c_par along it [1/s].
 template <class Real> struct Drag {
     Vec3<Real> t, push; // tangent; c wind [m/s^2]
     Lanes<Real> c_perp, c_par;

@@ -1,7 +1,7 @@
 // Length relaxation: moves points until every segment has its rest length ("rectify the length every time step").
 //
-// Source: KIST lecture "Hair Simulation 2" (2008) for "sweep", successive relaxation from root to tip; physics.md
-// section 3 and contact.md step d3 for "newton", one Newton step of C_j = (|d|^2 / l^2 - 1) / 2 = 0 at a time, a
+// Source: KIST lecture "Hair Simulation 2" (2008) for "sweep", successive relaxation from root to tip; step d3 of
+// docs/physics.md for "newton", one Newton step of C_j = (|d|^2 / l^2 - 1) / 2 = 0 at a time, a
 // tridiagonal system per strand. Both move a point through its mobility w P, P = I - a n n^T where it touches the head,
 // and so conserve the momentum of the free points. Notation: d edges (not unit) here, lambda multipliers.
 #pragma once

@@ -1,10 +1,10 @@
 // The rest shape of strands: lengths, masses, stiffness, and the curvature and torsion that a groomed strand keeps.
 //
-// Notation (physics.md): d unit edges, b = |d x d| sine of a bend, phi dihedral angle about an edge, l segment lengths,
+// Notation: d unit edges, b = |d x d| sine of a bend, phi dihedral angle about an edge, l segment lengths,
 // dl mean length of the two segments beside a point.
 // "rotor" weight about edge i, with k0 = kappa_0 dl:
 //     G = k_tau / dl  b_i b_{i+1} / ((b_i^2 + k0^2) (b_{i+1}^2 + k0^2)),      rho = b_{i+1} / b_i
-// physics.md has k_tau / (dl (b_i b_{i+1} + k0^2)): the same for curls. Ours fades to 0 at a straight joint, where
+// The plain form is k_tau / (dl (b_i b_{i+1} + k0^2)): the same for curls. Ours fades to 0 at a straight joint, where
 // torsion has no meaning, and bounds the stiffness G rho and G / rho beside one
 // (test_rotor_weight_fades_on_straight_hair).
 #pragma once

@@ -1,6 +1,6 @@
 // One time step of a block of strands: solve, contact and length relaxation in rounds, velocities; halved on failure.
 //
-// Source: physics.md section 3, contact.md section 1. A lane that has converged is left alone while others go on, and
+// The scheme: docs/physics.md, "One step" and "Contact". A lane that has converged is left alone while others go on, and
 // a halved step is taken over only by the lanes that needed it: the motion of a strand does not depend on the strands
 // beside it (test_a_strand_moves_the_same_alone_and_among_others).
 #pragma once
@@ -86,7 +86,7 @@ template <class Real> class Stepper {
     Vec3<Real> *f_, *u_, *star_; // forces, velocities of travel, points before the rounds
     M hopeless_{};               // lanes that failed in the shortest step too: not halved again in this one
 
-    /// One step, or two half steps for the lanes in which it fails (contact.md step f).
+    /// One step, or two half steps for the lanes in which it fails (step f).
     void advance(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to, M wanted, int depth) {
         const Tally<Real> before = tally;
         M failed = attempt(interval, from, to, wanted);

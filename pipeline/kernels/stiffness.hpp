@@ -1,7 +1,7 @@
 // What each joint and segment adds to the system of a step: its gradient to the edges, its stiffness to the assembly.
 //
 //     K = sum g g^T (Gauss-Newton, for bending and torsion) + max(0, 1 - kappa_r/kappa) transverse bending
-//         + k_s d d^T + (T/l)^+ (I - d d^T),      k_s = max(1e3 m0/dt^2, 10 T/l)      (physics.md section 3)
+//         + k_s d d^T + (T/l)^+ (I - d d^T),      k_s = max(1e3 m0/dt^2, 10 T/l)
 // The exact g g^T of bending is needed: without it tight curls blow up at 2 ms. All is by edges: see banded.hpp.
 // Internal damping is beta times the g g^T only, which a rigid turn leaves alone. The other stiffness would brake it: k_s
 // the more, the shorter the step (test_the_motion_converges_with_damping). The tension is that of the step's end,

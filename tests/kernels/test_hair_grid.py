@@ -176,7 +176,7 @@ def test_the_push_has_a_limit() -> None:
 
 @pytest.mark.parametrize("hair", ["curly, hanging", "straight, from the side"])
 def test_a_bundle_keeps_its_width(hair: str) -> None:
-    """37 guides from roots 7 mm apart come to rest, and wider than without neighbours (contact.md: 48 and 57 mm)."""
+    """37 guides from roots 7 mm apart come to rest, and wider than without neighbours."""
     strand = helix(0.008, 0.02, 0.25, 32) if "curly" in hair else np.linspace([0.0, 0, 0], [0.25, 0, 0], 32)
     head = np.eye(4) if "hanging" in hair else turned((0, 0, 1), np.pi / 2)
     found = {}

@@ -242,7 +242,7 @@ def test_wind_carries_a_free_strand_and_air_stops_it(straight: Points) -> None:
 
 
 def test_terminal_fall_of_an_isolated_fibre(straight: Points) -> None:
-    """g = (11 + 15 u) u: about half a metre per second for a level fibre (contact.md section 2)."""
+    """g = (11 + 15 u) u: about half a metre per second for a level fibre."""
     rest = shape(straight[None], held=np.zeros((1, 32), np.uint8))
     state = kernels.at_rest(straight[None])
     kernels.advance(state, rest, None, drive(480), settings(drag=11.0, drag_speed=15.0))
