@@ -75,12 +75,21 @@ def bench_simulate(
         Literal["none", "grid", "capsule"], Parameter(help="Method of hair-hair contact.")
     ] = "none",
     falling: Annotated[bool, Flag, Parameter(help="Curls that fall onto one another.")] = False,
+    torsion: Literal["none", "frenet", "rotor", "kirchhoff"] = "rotor",
+    scaling: Annotated[
+        bool, Flag, Parameter(help="How the cost grows with threads, guides (up to the given) and points.")
+    ] = False,
     json: Json = False,
 ) -> None:
-    """Steps of guides on a head: nanoseconds for each point and step."""
-    from pipeline.bench.simulate import bench
+    """Steps of guides on a head: nanoseconds for each point and step, and the part of the machine's peak."""
+    if scaling:
+        from pipeline.bench.scaling import scaling as measure
 
-    figures = bench(guides, points, precision, threads, hair, falling)
+        figures = measure(precision=precision, threads=threads or 2, most=guides)
+    else:
+        from pipeline.bench.simulate import bench
+
+        figures = bench(guides, points, precision, threads, hair, falling, torsion)
     _report(figures, json)
 
 
