@@ -93,6 +93,26 @@ def bench_simulate(
     _report(figures, json)
 
 
+@bench.command(name="campaign")
+def bench_campaign(
+    *,
+    seconds: Annotated[float, Parameter(help="Of shake, before 5 s of stillness.")] = 60.0,
+    json: Json = False,
+) -> int:
+    """A long shake of straight, wavy, curly and tight hair; exit code 1 where lengths, the head or a curl gave way."""
+    from pipeline.bench.campaign import campaign
+
+    runs = [asdict(run) for run in campaign(seconds)]
+    if json:
+        print_json({"runs": runs})
+    else:
+        _table(runs, tuple(runs[0]))
+    held = all(
+        r["finite"] and r["strain"] <= 1.001e-4 and r["depth"] <= 1e-4 and r["astray"] == 0 for r in runs
+    )
+    return 0 if held else 1
+
+
 @bench.command(name="interpolate")
 def bench_interpolate(*, strands: Count = 1_000_000, points: Count = 32, json: Json = False) -> None:
     """Expansion of guides to the full count: seconds and memory for each frame."""
