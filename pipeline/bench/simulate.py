@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
+from pipeline.bench.flops import flops_per_point_step, part_of_peak
 from pipeline.config.schema import HairContact, Motion, Simulate
 from pipeline.simulate.hair_contact import Cost
 from pipeline.simulate.stepper import Guides, Simulation
@@ -28,37 +29,57 @@ def bench(
     threads: int = 2,
     hair: Literal["none", "grid", "capsule"] = "none",
     falling: bool = False,
+    torsion: Literal["none", "frenet", "rotor", "kirchhoff"] = "rotor",
+    repeats: int = _REPEATS,
 ) -> dict[str, float]:
     """Step hair of 25 cm at dt = 1/240 s with the stage's own stepper.
 
     Waves that have settled on a shaking head, medians over repeats; or, `falling`, a second of curls that stand on a
     head and fall onto one another. `hair` is the method of hair-hair contact. Returns ns_per_point_step,
-    frames_per_second (10 steps a frame), threads, and hair_ms_per_step, the part of hair-hair contact.
+    frames_per_second (10 steps a frame), threads, and hair_ms_per_step, the part of hair-hair contact. For "rotor" also
+    the operations of a step and what part of the machine's peak they make.
     """
     kernels.set_threads(threads)
     if falling:
         simulate = Simulate(
-            precision=precision, rest="groom", settle=0, frames=24, hair_contact=HairContact(method=hair)
+            precision=precision,
+            torsion=torsion,
+            rest="groom",
+            settle=0,
+            frames=24,
+            hair_contact=HairContact(method=hair),
         )
         simulation = Simulation(simulate, seed=1, guides=curly_head(guides, points))
         return _figures(simulation, _timed(simulation, simulate.frames) / simulate.frames, threads)
     motion = Motion(preset="shake", period=1.0, swings=1000, amplitude=0.3, pivot=(0.0, 0.0, 0.0))
-    simulate = Simulate(precision=precision, motion=motion, hair_contact=HairContact(method=hair))
+    simulate = Simulate(
+        precision=precision,
+        motion=motion,
+        hair_contact=HairContact(method=hair),
+        torsion=torsion,
+        rest="groom",
+    )
     simulation = Simulation(simulate, seed=1, guides=round_head(guides, points))
     simulation.settle()
     simulation.cost = Cost()
-    seconds = [_timed(simulation, _FRAMES) for _ in range(1 + _REPEATS)][1:]
+    seconds = [_timed(simulation, _FRAMES) for _ in range(1 + repeats)][1:]
     return _figures(simulation, float(np.median(seconds)) / _FRAMES, threads)
 
 
 def _figures(simulation: Simulation, frame: float, threads: int) -> dict[str, float]:
     guides, points = simulation.state.points.shape[:2]
-    return {
-        "ns_per_point_step": round(frame / (simulation.simulate.substeps * guides * points) * 1e9, 3),
+    cost, simulate = simulation.cost, simulation.simulate
+    ns = frame / (simulate.substeps * guides * points) * 1e9
+    figures = {
+        "ns_per_point_step": round(ns, 3),
         "frames_per_second": round(1 / frame, 3),
         "threads": threads,
-        "hair_ms_per_step": round(simulation.cost.neighbours / simulation.cost.steps * 1e3, 3),
+        "hair_ms_per_step": round(cost.neighbours / cost.steps * 1e3, 3),
     }
+    if simulate.torsion == "rotor":
+        flops = flops_per_point_step(cost.solves / cost.steps, cost.rounds / cost.steps)
+        figures |= part_of_peak(flops, ns, simulate.precision, kernels.threads())
+    return figures
 
 
 def round_head(guides: int, points: int) -> Guides:

@@ -75,13 +75,42 @@ def bench_simulate(
         Literal["none", "grid", "capsule"], Parameter(help="Method of hair-hair contact.")
     ] = "none",
     falling: Annotated[bool, Flag, Parameter(help="Curls that fall onto one another.")] = False,
+    torsion: Literal["none", "frenet", "rotor", "kirchhoff"] = "rotor",
+    scaling: Annotated[
+        bool, Flag, Parameter(help="How the cost grows with threads, guides (up to the given) and points.")
+    ] = False,
     json: Json = False,
 ) -> None:
-    """Steps of guides on a head: nanoseconds for each point and step."""
-    from pipeline.bench.simulate import bench
+    """Steps of guides on a head: nanoseconds for each point and step, and the part of the machine's peak."""
+    if scaling:
+        from pipeline.bench.scaling import scaling as measure
 
-    figures = bench(guides, points, precision, threads, hair, falling)
+        figures = measure(precision=precision, threads=threads or 2, most=guides)
+    else:
+        from pipeline.bench.simulate import bench
+
+        figures = bench(guides, points, precision, threads, hair, falling, torsion)
     _report(figures, json)
+
+
+@bench.command(name="campaign")
+def bench_campaign(
+    *,
+    seconds: Annotated[float, Parameter(help="Of shake, before 5 s of stillness.")] = 60.0,
+    json: Json = False,
+) -> int:
+    """A long shake of straight, wavy, curly and tight hair; exit code 1 where lengths, the head or a curl gave way."""
+    from pipeline.bench.campaign import campaign
+
+    runs = [asdict(run) for run in campaign(seconds)]
+    if json:
+        print_json({"runs": runs})
+    else:
+        _table(runs, tuple(runs[0]))
+    held = all(
+        r["finite"] and r["strain"] <= 1.001e-4 and r["depth"] <= 1e-4 and r["astray"] == 0 for r in runs
+    )
+    return 0 if held else 1
 
 
 @bench.command(name="interpolate")

@@ -39,12 +39,17 @@ class Cost:
     seconds: float = 0.0
     neighbours: float = 0.0
     """Of the seconds, those of hair-hair contact."""
+    solves: float = 0.0
+    rounds: float = 0.0
+    """Solves and rounds of relaxation of a block of strands."""
 
     def add(self, steps: int, report: kernels.Report) -> None:
         """Count the steps of one call."""
         self.steps += steps
         self.seconds += report.seconds
         self.neighbours += report.neighbour_seconds
+        self.solves += steps * report.solves
+        self.rounds += steps * report.rounds
 
     def line(self, method: str) -> str:
         """What hair-hair contact costs, in words."""

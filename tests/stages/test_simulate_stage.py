@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline import cache, kernels
+from pipeline.bench.scaling import scaling
 from pipeline.bench.simulate import bench, round_head
 from pipeline.config.schema import Config, Keyframe, Motion, Simulate
 from pipeline.errors import InputError
@@ -265,3 +266,19 @@ def test_the_bench_measures_what_it_promises() -> None:
     per_second = figures["frames_per_second"] * 10 * 64 * 16
     assert per_second * figures["ns_per_point_step"] == pytest.approx(1e9, rel=1e-3)
     assert figures["threads"] == 1
+    assert 1000 < figures["flops_per_point_step"] < 4000
+    assert 0 < figures["part_of_peak"] < 1
+
+
+def test_scaling_fits_how_the_cost_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Costs that are known: as guides to the power 1.1, as points to the power 0.9, half of it with two threads."""
+
+    def known(guides: int, points: int, threads: int, **_: object) -> dict[str, float]:
+        return {"ns_per_point_step": guides**0.1 * points**-0.1 / threads}
+
+    monkeypatch.setattr("pipeline.bench.scaling.bench", known)
+    figures = scaling(threads=2)
+    print(figures)
+    assert figures["exponent_guides"] == pytest.approx(1.1, abs=1e-4)
+    assert figures["exponent_points"] == pytest.approx(0.9, abs=1e-4)
+    assert figures["speed_up"] == pytest.approx(2.0)
