@@ -43,7 +43,8 @@ def read_hair(path: Path) -> Ragged:
         raise file.error(f"the strands have {int(counts.sum())} points, but the header says {points}")
     rows = file.array("points", np.float32, 3 * points, offset).reshape(-1, 3)
     pins = np.tile(np.array([2, 0], np.uint8), (strands, 1))
-    return Ragged(rows.astype(np.float64), counts, pins)
+    with np.errstate(invalid="ignore"):  # signalling nans are told by index later, as other nans are
+        return Ragged(rows.astype(np.float64), counts, pins)
 
 
 def write_hair(path: Path, strands: Ragged) -> None:
