@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.strands.formats.ragged import Bytes, Ragged
+from pipeline.strands.formats.ragged import Bytes, Ragged, widened
 
 _HEADER = 128
 _SEGMENTS, _POINTS = 1, 2  # bits of the flags
@@ -43,8 +43,7 @@ def read_hair(path: Path) -> Ragged:
         raise file.error(f"the strands have {int(counts.sum())} points, but the header says {points}")
     rows = file.array("points", np.float32, 3 * points, offset).reshape(-1, 3)
     pins = np.tile(np.array([2, 0], np.uint8), (strands, 1))
-    with np.errstate(invalid="ignore"):  # signalling nans are told by index later, as other nans are
-        return Ragged(rows.astype(np.float64), counts, pins)
+    return Ragged(widened(rows), counts, pins)
 
 
 def write_hair(path: Path, strands: Ragged) -> None:

@@ -10,6 +10,12 @@ from numpy.typing import DTypeLike, NDArray
 from pipeline.errors import InputError
 
 
+def widened(points: NDArray[np.floating]) -> NDArray[np.float64]:
+    """As float64, also of signalling nans: they are told by index later, as other nans are."""
+    with np.errstate(invalid="ignore"):
+        return points.astype(np.float64)
+
+
 @dataclass(frozen=True)
 class Ragged:
     """Strands one after the other, root first."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.strands.formats.ragged import Bytes, Ragged
+from pipeline.strands.formats.ragged import Bytes, Ragged, widened
 
 _HEADER_4, _HEADER_3, _POSITIONS_3 = 160, 296, 144
 
@@ -49,7 +49,7 @@ def _read_4(file: Bytes) -> Ragged:
     root = np.where(held.all(axis=1), points, (~held).argmax(axis=1))
     tip = np.where(held.all(axis=1), 0, (~held[:, ::-1]).argmax(axis=1))
     pins = np.stack([np.minimum(root, 255), np.minimum(tip, 255)], axis=1).astype(np.uint8)
-    return Ragged(rows[..., :3].reshape(-1, 3).astype(np.float64), np.full(strands, points, np.int64), pins)
+    return Ragged(widened(rows[..., :3].reshape(-1, 3)), np.full(strands, points, np.int64), pins)
 
 
 def _read_3(file: Bytes) -> Ragged:
@@ -59,7 +59,7 @@ def _read_3(file: Bytes) -> Ragged:
     _check(file, strands, points, offset, _HEADER_3)
     rows = file.array("positions", np.float32, 3 * strands * points, offset).reshape(-1, 3)
     pins = np.tile(np.array([2, 2 if both_ends else 0], np.uint8), (strands, 1))
-    return Ragged(rows.astype(np.float64), np.full(strands, points, np.int64), pins)
+    return Ragged(widened(rows), np.full(strands, points, np.int64), pins)
 
 
 _FIELDS_4 = (("number of strands", 4), ("points per strand", 8), ("offset of positions", 12))

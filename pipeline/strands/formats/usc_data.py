@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.strands.formats.ragged import Bytes, Ragged
+from pipeline.strands.formats.ragged import Bytes, Ragged, widened
 
 
 def read_data(path: Path) -> Ragged:
@@ -26,7 +26,7 @@ def read_data(path: Path) -> Ragged:
         pieces.append(file.array(f"strand {strand}", np.float32, 3 * count, offset + 4))
         counts[strand] = count
         offset += 4 + 12 * count
-    points = np.concatenate(pieces).reshape(-1, 3).astype(np.float64)
+    points = widened(np.concatenate(pieces).reshape(-1, 3))
     return Ragged(points, counts, np.tile(np.array([2, 0], np.uint8), (strands, 1)))
 
 
