@@ -18,6 +18,7 @@ NEEDS = {
 }
 _KINDS = {"groom": "groom", "simulate": "guides", "interpolate": "strands"}
 _REASONS_SHOWN = 3
+_CHANGES_SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,10 @@ class Batch:
             return str(error)
 
     def _difference(self, stage: str, provenance: dict[str, dict[str, object]]) -> str:
-        return "; ".join(explain(provenance.get("inputs", {}), self.inputs[stage])) or "its key changed"
+        reasons = explain(provenance.get("inputs", {}), self.inputs[stage])
+        if len(reasons) > _CHANGES_SHOWN:
+            reasons = [*reasons[: _CHANGES_SHOWN - 1], f"and {len(reasons) - _CHANGES_SHOWN + 1} more"]
+        return "; ".join(reasons) or "its key changed"
 
     def _state_of_frames(self, frames: range) -> State:
         """Examine frames one by one; tell the first few different reasons."""
