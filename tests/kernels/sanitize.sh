@@ -12,6 +12,7 @@ python=${PYTHON:-$root/.venv/bin/python}
 build=$root/build/sanitize
 case $python in /*) ;; *) python=$PWD/$python ;; esac
 tools=$(dirname "$python")
+mkdir -p "$build"
 
 "$tools/cmake" -S "$root/pipeline/kernels" -B "$build/objects" -G Ninja -DCMAKE_BUILD_TYPE=Debug \
     -DCMAKE_MAKE_PROGRAM="$tools/ninja" -DPython_EXECUTABLE="$python" -DRINGLET_SANITIZE=ON >"$build.log" 2>&1 ||
