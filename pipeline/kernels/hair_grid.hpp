@@ -177,8 +177,10 @@ template <class Real> class GridForce final : public NeighbourForce<Real> {
         Around(Vec3<Real> place, const Box &box) : nowhere(place.y <= kNowhere) {
             M x, z;
             below(place.x, x, f.x), below(place.y, y, f.y), below(place.z, z, f.z);
-            x -= box.low[0], y -= box.low[1], z -= box.low[2];
-            at = nowhere ? M{} : (y * box.n[2] + z) * box.n[0] + x;
+            x = nowhere ? M{} : x - box.low[0];
+            y = nowhere ? M{} : y - box.low[1];
+            z = nowhere ? M{} : z - box.low[2];
+            at = (y * box.n[2] + z) * box.n[0] + x;
         }
 
         /// Whole cells and the rest, which does not depend on the box.
