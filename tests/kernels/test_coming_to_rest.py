@@ -1,4 +1,4 @@
-"""Coming to rest: air and inner damping stop hair after a shake, as fast as the table of the prototype says.
+"""Coming to rest: air and inner damping stop hair within a second and a half of a shake.
 
 64 strands of 25 cm on a round head, yaw of 60 degrees at 2 Hz for a second, then a hard stop; a fibre of 80 um with
 0.3 of the drag of an isolated one and beta = 3 ms.
@@ -28,9 +28,9 @@ def speeds_after_the_stop(kind: str, seconds: tuple[float, ...]) -> list[float]:
     return found
 
 
-@pytest.mark.parametrize(("kind", "expected"), [("straight", (149, 44, 16)), ("curly", (193, 64, 21))])
-def test_hair_is_at_rest_one_and_a_half_seconds_after_a_stop(kind: str, expected: tuple[int, ...]) -> None:
+@pytest.mark.parametrize("kind", HAIR)
+def test_hair_is_at_rest_one_and_a_half_seconds_after_a_stop(kind: str) -> None:
     found = [1e3 * speed for speed in speeds_after_the_stop(kind, (0.5, 1.0, 1.5))]
-    print(f"{kind}: rms {', '.join(f'{speed:.0f}' for speed in found)} mm/s after 0.5, 1, 1.5 s; {expected}")
+    print(f"{kind}: rms {', '.join(f'{speed:.0f}' for speed in found)} mm/s after 0.5, 1, 1.5 s")
     assert found[-1] < 30
     assert found == sorted(found, reverse=True)
