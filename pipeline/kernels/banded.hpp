@@ -123,7 +123,7 @@ template <class Real, int Unknowns, int Band> struct Pivots {
     }
 };
 
-/// The rows of one point without contact, kept for another solve.
+/// The rows of one point.
 template <class Real, int Unknowns, int Band> struct Rows {
     Lanes<Real> entries[Unknowns][Band], right[Unknowns];
 };

@@ -95,7 +95,7 @@ template <class Real, class Window> RINGLET_INLINE void add_contact(const Equati
     if (!any<Real>(eq.contacts.row[i] > 0)) return;
     const Vec3<Real> n = eq.contacts.n[i];
     const Lanes<Real> k = (Real(eq.settings.theta) * Real(kRow)) * eq.contacts.row[i];
-    window.add_row(n, k, dot(n, eq.from.v[i]) - eq.contacts.gap[i] / Real(eq.step.dt));
+    window.add_row(n, k, dot(n, eq.from.v[i]) - Real(1 / eq.step.dt) * eq.contacts.gap[i]);
 }
 
 /// Edges that a joint of the model reaches.
@@ -112,23 +112,17 @@ template <class Real, Torsion torsion> class Solver {
     using PointRows = Rows<Real, Unknowns, Band>;
 
   public:
-    Solver(Arena &arena, int P)
-        : kept_(arena.take<PointRows>(P)), pivots_(arena.take<Pivots<Real, Unknowns, Band>>(P)) {}
+    Solver(Arena &arena, int P) : pivots_(arena.take<Pivots<Real, Unknowns, Band>>(P)) {}
 
-    /// Solves for the velocities. `again`: as before but for the rows of contacts.
-    void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
+    /// Solves for the velocities.
+    void solve(const Equation<Real> &eq, const Velocities<Real> &to) {
         const Block<Real> &b = eq.b;
         const int first = turns ? std::max(b.first - 1, 0) : b.first; // segment first - 1 turns
         const Scale<Real> scale = stiffness_scale(eq);
         System assembly;
         Window<Real, Unknowns, Band> window;
         for (int i = 0; i < b.P; ++i) {
-            if (again) {
-                window.rows = kept_[i];
-            } else {
-                assemble(eq, i, scale, to, assembly, window.rows);
-                if (eq.contacts.any_row) kept_[i] = window.rows;
-            }
+            assemble(eq, i, scale, to, assembly, window.rows);
             const Values known = known_at(i, to);
             if (i < first) {
                 window.pass(known.value);
@@ -152,7 +146,6 @@ template <class Real, Torsion torsion> class Solver {
         L value[Unknowns];
     };
 
-    PointRows *kept_; // rows without contacts, for another solve
     Pivots<Real, Unknowns, Band> *pivots_;
 
     RINGLET_INLINE static Values known_at(int i, const Velocities<Real> &at) {
@@ -276,11 +269,11 @@ template <class Real> struct Solvers {
         : none(arena, torsion == Torsion::none ? P : 0), rotor(arena, torsion == Torsion::rotor ? P : 0),
           frenet(arena, torsion == Torsion::frenet ? P : 0), kirchhoff(arena, torsion == Torsion::kirchhoff ? P : 0) {}
 
-    void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
-        if (eq.settings.torsion == Torsion::kirchhoff) kirchhoff.solve(eq, again, to);
-        else if (eq.settings.torsion == Torsion::rotor) rotor.solve(eq, again, to);
-        else if (eq.settings.torsion == Torsion::frenet) frenet.solve(eq, again, to);
-        else none.solve(eq, again, to);
+    void solve(const Equation<Real> &eq, const Velocities<Real> &to) {
+        if (eq.settings.torsion == Torsion::kirchhoff) kirchhoff.solve(eq, to);
+        else if (eq.settings.torsion == Torsion::rotor) rotor.solve(eq, to);
+        else if (eq.settings.torsion == Torsion::frenet) frenet.solve(eq, to);
+        else none.solve(eq, to);
     }
 };
 

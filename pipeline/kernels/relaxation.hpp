@@ -36,7 +36,7 @@ template <class Real> struct Lengths {
         L worst = none;
         for (int j = std::max(b.first - 1, 0); j < b.P - 1; ++j) {
             d[j] = x[j + 1] - x[j];
-            L C = Real(0.5) * (dot(d[j], d[j]) / (b.l[j] * b.l[j]) - 1);
+            L C = Real(0.5) * (dot(d[j], d[j]) * (b.inverse_l[j] * b.inverse_l[j]) - 1);
             C = select<Real>(b.w[j] + b.w[j + 1] > none, C, none);
             worst = maximum<Real>(maximum<Real>(C, -C), worst);
         }
@@ -50,7 +50,7 @@ template <class Real> struct Lengths {
         L across = contacts.a[begin] * dot(contacts.n[begin], d[begin]); // n.d of edge j at its root end
         L coupling = none;                                               // entry (j-1, j)
         for (int j = begin; j < end; ++j) {
-            L il2 = 1 / (b.l[j] * b.l[j]), dd = dot(d[j], d[j]);
+            L il2 = b.inverse_l[j] * b.inverse_l[j], dd = dot(d[j], d[j]);
             L ahead = contacts.a[j + 1] * dot(contacts.n[j + 1], d[j]);
             L diagonal = il2 * il2 * (b.w[j] * (dd - Real(kShrink) * across * across) +
                                       b.w[j + 1] * (dd - Real(kShrink) * ahead * ahead));
@@ -65,7 +65,7 @@ template <class Real> struct Lengths {
             inverse[j] = select<Real>(fixed, none, 1 / diagonal);
             if (j + 1 == end) break;
             across = contacts.a[j + 1] * dot(contacts.n[j + 1], d[j + 1]);
-            coupling = -b.w[j + 1] * il2 / (b.l[j + 1] * b.l[j + 1]) *
+            coupling = -b.w[j + 1] * il2 * (b.inverse_l[j + 1] * b.inverse_l[j + 1]) *
                        (dot(d[j], d[j + 1]) - Real(kShrink) * ahead * across);
             upper[j] = coupling;
         }
@@ -78,7 +78,7 @@ template <class Real> struct Lengths {
             after = value * inverse[j];
             L applied = select<Real>(busy, after, none);
             lambda[j] += applied;
-            Vec3<Real> push = (applied / (b.l[j] * b.l[j])) * d[j];
+            Vec3<Real> push = (applied * (b.inverse_l[j] * b.inverse_l[j])) * d[j];
             move(b, contacts, j + 1, push - pull, x);
             pull = push;
         }

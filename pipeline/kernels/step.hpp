@@ -194,7 +194,7 @@ template <class Real> class Stepper {
         const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, start_, outside};
         for (int again = 0;; ++again) {
             ++tally.solves;
-            solvers_.solve(equation, again > 0, {u_, directors_.spin});
+            solvers_.solve(equation, {u_, directors_.spin});
             if (!contacts.any_row) break;
             if (!contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) break;
         }
@@ -246,9 +246,9 @@ template <class Real> class Stepper {
     /// Velocities from the positions (step e) and tensions from the multipliers (step g).
     void finish(const HeadStep<Real> &head, const Motion<Real> &from, Motion<Real> &to, Real dt) {
         const L per_theta = splat(1 / theta()), per_move = splat(1 / (dt * theta()));
+        const L per_square = block.m0 * splat(1 / (dt * dt * theta()));
         if (!settings_.is_explicit)
-            for (int j = 0; j < block.P - 1; ++j)
-                to.T[j] -= block.m0 * lengths_.lambda[j] * block.inverse_l[j] / (dt * dt * theta());
+            for (int j = 0; j < block.P - 1; ++j) to.T[j] -= per_square * lengths_.lambda[j] * block.inverse_l[j];
         for (int i = 0; i < block.P; ++i) {
             if (i < block.first) {
                 to.v[i] = u_[i];
