@@ -92,14 +92,6 @@ template <class Real> RINGLET_INLINE Lanes<Real> maximum(Lanes<Real> a, Lanes<Re
 
 template <class Real> RINGLET_INLINE Lanes<Real> minimum(Lanes<Real> a, Lanes<Real> b) { return a < b ? a : b; }
 
-/// Whether any lane of the mask is set.
-template <class Real> RINGLET_INLINE bool any(Mask<Real> mask) {
-    int64_t words[8], bits = 0;
-    __builtin_memcpy(words, &mask, sizeof words);
-    for (int64_t word : words) bits |= word;
-    return bits != 0;
-}
-
 /// A bit for each lane that is set.
 template <class Real> RINGLET_INLINE uint32_t set_lanes(Mask<Real> mask) {
 #ifdef __AVX512F__
@@ -109,6 +101,18 @@ template <class Real> RINGLET_INLINE uint32_t set_lanes(Mask<Real> mask) {
     uint32_t bits = 0;
     for (int i = 0; i < kLanes<Real>; ++i) bits |= uint32_t(mask[i] != 0) << i;
     return bits;
+#endif
+}
+
+/// Whether any lane of the mask is set.
+template <class Real> RINGLET_INLINE bool any(Mask<Real> mask) {
+#ifdef __AVX512F__
+    return set_lanes<Real>(mask) != 0;
+#else
+    int64_t words[8], bits = 0;
+    __builtin_memcpy(words, &mask, sizeof words);
+    for (int64_t word : words) bits |= word;
+    return bits != 0;
 #endif
 }
 
