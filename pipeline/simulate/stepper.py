@@ -156,11 +156,12 @@ class Simulation:
 
     def check(self) -> None:
         """Raise SimulationDiverged when a guide is not finite or torn."""
-        segments = np.linalg.norm(np.diff(self.state.points, axis=1), axis=2)
-        strain = np.abs(segments / self.rest.length - 1).max(axis=1)
-        diverged = ~(strain < _TORN)  # nan compares false
-        if diverged.any():
-            raise SimulationDiverged(int(np.argmax(diverged)), 1 - (-self.step // self.simulate.substeps))
+        edges = np.diff(self.state.points, axis=1)
+        lengths = np.sqrt(np.einsum("gpk,gpk->gp", edges, edges))
+        intact = np.abs(lengths / self.rest.length - 1) < _TORN  # nan compares false
+        if not intact.all():
+            guide = int(np.argmin(intact.all(axis=1)))
+            raise SimulationDiverged(guide, 1 - (-self.step // self.simulate.substeps))
 
     def _time(self, steps: float) -> float:
         return (self.step + steps) * self.settings.dt
