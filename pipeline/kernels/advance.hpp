@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace ringlet {
@@ -124,9 +125,14 @@ template <class Real> Report summarise(const std::vector<Tally<Real>> &tallies, 
 
 /// Index of the first strand with a number that is not finite, or -1.
 template <class Real> int first_bad_strand(const StateArrays<Real> &state, int S, int P) {
-    const size_t row = size_t(P) * 3;
-    for (size_t k = 0; k < S * row; ++k)
-        if (!std::isfinite(state.points[k]) || !std::isfinite(state.velocity[k])) return int(k / row);
+    constexpr Real most = std::numeric_limits<Real>::max();
+    const int row = P * 3;
+    for (int s = 0; s < S; ++s) {
+        const Real *x = state.points + size_t(s) * row, *v = state.velocity + size_t(s) * row;
+        int bad = 0; // no way out inside a strand, so that many numbers are looked at side by side
+        for (int k = 0; k < row; ++k) bad |= !(std::abs(x[k]) <= most) | !(std::abs(v[k]) <= most);
+        if (bad) return s;
+    }
     return -1;
 }
 
