@@ -112,17 +112,26 @@ template <class Real, Torsion torsion> class Solver {
     using PointRows = Rows<Real, Unknowns, Band>;
 
   public:
-    Solver(Arena &arena, int P) : pivots_(arena.take<Pivots<Real, Unknowns, Band>>(P)) {}
+    Solver(Arena &arena, int P)
+        : kept_(arena.take<PointRows>(P)), pivots_(arena.take<Pivots<Real, Unknowns, Band>>(P)) {}
 
-    /// Solves for the velocities.
-    void solve(const Equation<Real> &eq, const Velocities<Real> &to) {
+    /// Solves for the velocities. `again`: as before but for the rows of contacts. To keep the rows for that costs a
+    /// tenth of a solve, so they are kept only after a step that has solved again; else they are assembled again.
+    void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
+        if (!again) keeps_ = eq.contacts.any_row && solved_again_;
+        solved_again_ = again;
         const Block<Real> &b = eq.b;
         const int first = turns ? std::max(b.first - 1, 0) : b.first; // segment first - 1 turns
         const Scale<Real> scale = stiffness_scale(eq);
         System assembly;
         Window<Real, Unknowns, Band> window;
         for (int i = 0; i < b.P; ++i) {
-            assemble(eq, i, scale, to, assembly, window.rows);
+            if (again && keeps_) {
+                window.rows = kept_[i];
+            } else {
+                assemble(eq, i, scale, to, assembly, window.rows);
+                if (keeps_) kept_[i] = window.rows;
+            }
             const Values known = known_at(i, to);
             if (i < first) {
                 window.pass(known.value);
@@ -146,6 +155,8 @@ template <class Real, Torsion torsion> class Solver {
         L value[Unknowns];
     };
 
+    PointRows *kept_; // rows without contacts
+    bool keeps_ = false, solved_again_ = false;
     Pivots<Real, Unknowns, Band> *pivots_;
 
     RINGLET_INLINE static Values known_at(int i, const Velocities<Real> &at) {
@@ -269,11 +280,11 @@ template <class Real> struct Solvers {
         : none(arena, torsion == Torsion::none ? P : 0), rotor(arena, torsion == Torsion::rotor ? P : 0),
           frenet(arena, torsion == Torsion::frenet ? P : 0), kirchhoff(arena, torsion == Torsion::kirchhoff ? P : 0) {}
 
-    void solve(const Equation<Real> &eq, const Velocities<Real> &to) {
-        if (eq.settings.torsion == Torsion::kirchhoff) kirchhoff.solve(eq, to);
-        else if (eq.settings.torsion == Torsion::rotor) rotor.solve(eq, to);
-        else if (eq.settings.torsion == Torsion::frenet) frenet.solve(eq, to);
-        else none.solve(eq, to);
+    void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
+        if (eq.settings.torsion == Torsion::kirchhoff) kirchhoff.solve(eq, again, to);
+        else if (eq.settings.torsion == Torsion::rotor) rotor.solve(eq, again, to);
+        else if (eq.settings.torsion == Torsion::frenet) frenet.solve(eq, again, to);
+        else none.solve(eq, again, to);
     }
 };
 

@@ -194,7 +194,7 @@ template <class Real> class Stepper {
         const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, start_, outside};
         for (int again = 0;; ++again) {
             ++tally.solves;
-            solvers_.solve(equation, {u_, directors_.spin});
+            solvers_.solve(equation, again > 0, {u_, directors_.spin});
             if (!contacts.any_row) break;
             if (!contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) break;
         }
