@@ -98,7 +98,7 @@ template <class Real>
 void advance_block(Stepper<Real> &stepper, const BlockIndex<Real> &index, StateArrays<Real> &state,
                    const RestShape &rest, const Drive &drive, const StepSettings &settings) {
     stepper.tally = {};
-    read(stepper.block, rest, index);
+    read(stepper.block, rest, index, settings.torsion != Torsion::kirchhoff);
     read(stepper.now, state, rest.P, index);
     stepper.contacts.forget(rest.P);
     RootPose<Real> roots[2];

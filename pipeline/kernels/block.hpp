@@ -178,19 +178,31 @@ template <class Real> void derive(Block<Real> &b, const RestShape &rest, const i
     }
 }
 
-/// Reads the rest shape of a block of strands.
-template <class Real> void read(Block<Real> &b, const RestShape &rest, const BlockIndex<Real> &index) {
+/// Reads what "rotor" and "frenet" keep: rest curvature and torsion, and the dihedrals about segments with their weights.
+template <class Real> void read_curves(Block<Real> &b, const RestShape &rest, const int (&strand)[kLanes<Real>]) {
+    const int P = b.P;
+    gather<Real>(b.kappa_r + 1, rest.curvature.data(), P - 2, P - 2, strand);
+    gather<Real>(b.tau_r + 2, rest.torsion.data(), P - 4, P - 4, strand);
+    gather<Real>(b.G_after + 1, rest.ratio.data(), P - 3, P - 3, strand);
+    gather<Real>(b.G_before + 1, rest.weight.data(), P - 3, P - 3, strand);
+    gather<Real>(b.C + 1, rest.dihedral.data(), P - 3, P - 3, strand);
+    for (int i = 1; i < P - 2; ++i)
+        for (int lane = 0; lane < kLanes<Real>; ++lane) {
+            const Real phi = b.C[i][lane], G = b.G_before[i][lane], rho = b.G_after[i][lane];
+            b.C[i][lane] = std::cos(phi), b.S[i][lane] = std::sin(phi);
+            b.G_before[i][lane] = std::sqrt(G * rho), b.G_after[i][lane] = std::sqrt(G / rho);
+        }
+}
+
+/// Reads the rest shape of a block of strands; without curves, what "kirchhoff" needs.
+template <class Real>
+void read(Block<Real> &b, const RestShape &rest, const BlockIndex<Real> &index, bool curves = true) {
     const int P = b.P;
     const auto &strand = index.strand;
     gather(b.anchor, rest.points.data(), P, strand);
     gather<Real>(b.l, rest.length.data(), P - 1, P - 1, strand);
     gather<Real>(b.mu, rest.mass.data(), P, P, strand);
     gather<Real>(b.offset, rest.offset.data(), P, P, strand);
-    gather<Real>(b.kappa_r + 1, rest.curvature.data(), P - 2, P - 2, strand);
-    gather<Real>(b.tau_r + 2, rest.torsion.data(), P - 4, P - 4, strand);
-    gather<Real>(b.G_after + 1, rest.ratio.data(), P - 3, P - 3, strand);
-    gather<Real>(b.G_before + 1, rest.weight.data(), P - 3, P - 3, strand);
-    gather<Real>(b.C + 1, rest.dihedral.data(), P - 3, P - 3, strand);
     gather<Real>(&b.k_kappa, rest.bending.data(), 1, 1, strand);
     gather<Real>(&b.k_tau, rest.twisting.data(), 1, 1, strand);
     gather<Real>(&b.k_kappa_2, rest.bending_2.data(), 1, 1, strand);
@@ -204,12 +216,7 @@ template <class Real> void read(Block<Real> &b, const RestShape &rest, const Blo
     gather(b.load, rest.load.data(), P, strand);
     gather(b.director, rest.directors.data(), P - 1, strand);
     gather(b.strain + 1, rest.strain.data(), P - 2, strand);
-    for (int i = 1; i < P - 2; ++i)
-        for (int lane = 0; lane < kLanes<Real>; ++lane) {
-            const Real phi = b.C[i][lane], G = b.G_before[i][lane], rho = b.G_after[i][lane];
-            b.C[i][lane] = std::cos(phi), b.S[i][lane] = std::sin(phi);
-            b.G_before[i][lane] = std::sqrt(G * rho), b.G_after[i][lane] = std::sqrt(G / rho);
-        }
+    if (curves) read_curves(b, rest, strand);
     derive(b, rest, strand);
     derive_root(b);
 }

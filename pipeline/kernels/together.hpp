@@ -79,7 +79,7 @@ template <class Real> class Together {
 #pragma omp for schedule(static)
         for (int b = 0; b < int(blocks_.size()); ++b) {
             Resident<Real> &resident = blocks_[b];
-            read(resident.block, rest_, resident.index);
+            read(resident.block, rest_, resident.index, settings_.torsion != Torsion::kirchhoff);
             read(resident.now, state_, rest_.P, resident.index);
             stepper.exchange(resident);
             stepper.contacts.forget(rest_.P);
