@@ -1,8 +1,12 @@
-"""Named tiny strands: every one is (P, 3) float64 [m], root first, at equal spacing."""
+"""Named tiny strands: every one is (P, 3) float64 [m], root first, at equal spacing; and what every test leaves as it was."""
+
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
+from pipeline import kernels
 
 Points = NDArray[np.float64]
 
@@ -12,6 +16,14 @@ def helix(radius: float, pitch: float, length: float, points: int) -> Points:
     rise = pitch / (2 * np.pi)
     angle = np.linspace(0, length, points) / np.hypot(radius, rise)
     return np.stack([rise * angle, radius * np.cos(angle) - radius, radius * np.sin(angle)], axis=-1)
+
+
+@pytest.fixture(autouse=True)
+def _threads() -> Iterator[None]:
+    """Every test leaves the number of threads as it found it."""
+    count = kernels.threads()
+    yield
+    kernels.set_threads(count)
 
 
 @pytest.fixture

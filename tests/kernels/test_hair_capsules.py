@@ -1,6 +1,5 @@
 """Hair-hair contact by capsules: opposite forces, Coulomb's law, nothing passes through, and hair comes to rest."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -27,14 +26,6 @@ from pipeline import kernels
 Points = NDArray[np.float64]
 RADIUS, STIFFNESS, FRICTION, SPEED = 1.5e-3, 0.005, 0.3, 0.2
 FROM_THE_SIDE = turned((0, 0, 1), np.pi / 2)
-
-
-@pytest.fixture(autouse=True)
-def _threads() -> Iterator[None]:
-    """Every test leaves the number of threads as it found it."""
-    count = kernels.threads()
-    yield
-    kernels.set_threads(count)
 
 
 def capsules(rest: kernels.RestShape, **values: float) -> kernels.HairCapsules:

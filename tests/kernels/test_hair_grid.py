@@ -1,6 +1,6 @@
 """Hair-hair contact by the density grid: it conserves momentum, leaves the groom alone, and makes a bundle wider."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,14 +25,6 @@ from pipeline import kernels
 
 Points = NDArray[np.float64]
 Head = tuple[kernels.RestShape, kernels.State]
-
-
-@pytest.fixture(autouse=True)
-def _threads() -> Iterator[None]:
-    """Every test leaves the number of threads as it found it."""
-    count = kernels.threads()
-    yield
-    kernels.set_threads(count)
 
 
 def grid(rest: kernels.RestShape, **values: float) -> kernels.HairGrid:

@@ -1,7 +1,5 @@
 """Distance to a mesh: exact near it, signed, the same for any number of threads; feet and how far they move."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,12 +11,6 @@ FACES = np.array(
     [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]], np.int32
 )
 CORNERS = 0.08 * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]], np.float64)
-
-
-@pytest.fixture(autouse=True)
-def _threads() -> Iterator[None]:
-    yield
-    kernels.set_threads(0)
 
 
 def octahedron() -> kernels.MeshDistance:

@@ -1,6 +1,5 @@
 """The step: what it conserves, what it may not depend on, and how it holds points."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -27,14 +26,6 @@ from pipeline import kernels
 
 Points = NDArray[np.float64]
 every_model = pytest.mark.parametrize("torsion", ["kirchhoff", "rotor"])
-
-
-@pytest.fixture(autouse=True)
-def _threads() -> Iterator[None]:
-    """Every test leaves the number of threads as it found it."""
-    count = kernels.threads()
-    yield
-    kernels.set_threads(count)
 
 
 def curly_head(count: int, precision: type = np.float32) -> tuple[kernels.RestShape, kernels.State]:
