@@ -16,6 +16,7 @@ _RADIUS, _YOUNG, _SHEAR, _DENSITY = 40e-6, 4e9, 0.9e9, 1300.0  # of a fibre
 _HEAD = 0.09  # radius [m]
 _STILL, _SETTLE = 5.0, 2.0  # [s]
 _KICK = 0.05  # [s] mean time between kicks
+_BENT = 0.1  # [rad] joints that bend less have no dihedral to speak of
 KINDS = {
     "straight": (0.0, 1.0),
     "wavy": (0.005, 0.06),
@@ -38,6 +39,8 @@ class Shaken:
     depth: float
     halvings: int
     astray: float
+    flipped: int
+    """Dihedrals that differ from those before the shake by more than a right angle."""
     speed: float
     """Largest at the end [m/s]."""
 
@@ -75,7 +78,7 @@ def _shaken(kind: str, torsion: str, precision: str, rate: int, seconds: float, 
     poses = _poses(seconds, rate)
     still = np.tile(poses[-1:], (round(_STILL * rate) + 1, 1, 1))
     reports = [_advance(state, rest, field, settings, np.tile(np.eye(4), (round(_SETTLE * rate) + 1, 1, 1)))]
-    before = _elastic(state, rest, settings)
+    before, shape = _elastic(state, rest, settings), state.points.astype(np.float64)
     for first in range(0, len(poses) - 1, rate):
         reports.append(_advance(state, rest, field, settings, poses[first : first + rate + 1]))
     reports.append(_advance(state, rest, field, settings, still))
@@ -90,6 +93,7 @@ def _shaken(kind: str, torsion: str, precision: str, rate: int, seconds: float, 
         depth=max(report.depth for report in reports),
         halvings=sum(report.halvings for report in reports),
         astray=float((after > 1.25 * before + 0.1 * before.mean()).mean()),
+        flipped=flipped(shape, state.points.astype(np.float64)),
         speed=float(np.abs(state.velocity).max()),
     )
 
@@ -101,6 +105,24 @@ def _advance(state: Any, rest: Any, field: Any, settings: Any, poses: Points) ->
 
 def _elastic(state: Any, rest: Any, settings: Any) -> NDArray[np.float64]:
     return np.asarray(kernels.energies(state, rest, settings)[:, :2].sum(axis=1))
+
+
+def flipped(before: Points, after: Points) -> int:
+    """How many dihedrals of strands (S, P, 3) turned by more than a right angle, of those with a bend at both ends."""
+    angle, bent = _dihedrals(before)
+    now, still_bent = _dihedrals(after)
+    return int((bent & still_bent & (np.cos(now - angle) < 0)).sum())
+
+
+def _dihedrals(points: Points) -> tuple[Points, NDArray[np.bool_]]:
+    """Dihedral (S, P-3) [rad] about each inner segment, and whether both its joints are bent."""
+    tangent = np.diff(points, axis=1)
+    tangent /= np.linalg.norm(tangent, axis=2, keepdims=True)
+    binormal = np.cross(tangent[:, :-1], tangent[:, 1:])
+    bent = np.linalg.norm(binormal, axis=2) > np.sin(_BENT)
+    before, after = binormal[:, :-1], binormal[:, 1:]
+    sine = (np.cross(before, after) * tangent[:, 1:-1]).sum(axis=2)
+    return np.arctan2(sine, (before * after).sum(axis=2)), bent[:, :-1] & bent[:, 1:]
 
 
 def _poses(seconds: float, rate: int) -> Points:

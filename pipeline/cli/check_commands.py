@@ -108,7 +108,8 @@ def bench_campaign(
     else:
         _table(runs, tuple(runs[0]))
     held = all(
-        r["finite"] and r["strain"] <= 1.001e-4 and r["depth"] <= 1e-4 and r["astray"] == 0 for r in runs
+        r["finite"] and r["strain"] <= 1.001e-4 and r["depth"] <= 1e-4 and r["astray"] == r["flipped"] == 0
+        for r in runs
     )
     return 0 if held else 1
 
