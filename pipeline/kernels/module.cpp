@@ -33,6 +33,7 @@ void bind_mesh(nb::module_ &m);
 void bind_shade(nb::module_ &m);
 void bind_expand(nb::module_ &m);
 void bind_peak(nb::module_ &m);
+void bind_raster(nb::module_ &m);
 void bind_statics(nb::module_ &m);
 void bind_neighbours(nb::module_ &m);
 void bind_step(nb::module_ &m);
@@ -52,6 +53,7 @@ NB_MODULE(RINGLET_MODULE, m) {
     ringlet::bind_expand(m);
     ringlet::bind_mesh(m);
     ringlet::bind_peak(m);
+    ringlet::bind_raster(m);
     ringlet::bind_statics(m);
     ringlet::bind_neighbours(m);
     ringlet::bind_step(m);

@@ -1,0 +1,110 @@
+// Python's view of the raster.
+#include "bindings.hpp"
+
+#include "raster.hpp"
+
+#include <array>
+
+#include <nanobind/stl/array.h>
+
+namespace ringlet {
+
+using Points = Array<const float, -1, -1, 3>;
+using Widths = Array<const float, -1, -1>;
+using Picture = Array<float, -1, -1, 3>;
+
+/// What lies behind the hair, with the arrays that it points into.
+struct HeldBackdrop : Backdrop {
+    Widths depth_array;
+    Array<const uint8_t, -1, -1, 3> sample_array;
+    Array<const float, 256> decode_array;
+};
+
+static void make_backdrop(HeldBackdrop *held, Widths depth, Array<const uint8_t, -1, -1, 3> samples,
+                          Array<const float, 256> decode, int per_side) {
+    require(per_side >= 1 && per_side <= 8, "Backdrop: expected 1 to 8 samples a side");
+    require(samples.shape(0) == depth.shape(0) && samples.shape(1) == depth.shape(1), "Backdrop: samples do not fit depth");
+    new (held) HeldBackdrop{{depth.data(), samples.data(), decode.data(), per_side}, depth, samples, decode};
+}
+
+static void make_raster(Raster *raster, std::array<int, 2> size, Array<const double, 4, 4> matrix, double scale,
+                        std::array<double, 2> range, float layers) {
+    require(size[0] >= 1 && size[1] >= 1 && size[0] <= 1 << 15 && size[1] <= 1 << 15, "Raster: expected a size of 1 to 32768");
+    require(range[0] > 0 && range[1] > range[0] && std::isfinite(range[1]), "Raster: expected 0 < near < far");
+    require(scale > 0 && std::isfinite(scale), "Raster: expected a positive scale");
+    require(layers > 0, "Raster: expected a positive number of layers");
+    View view{{}, size[0], size[1], float(scale), float(range[0]), float(range[1])};
+    for (int i = 0; i < 16; ++i) view.M[i / 4][i % 4] = float(matrix.data()[i]);
+    new (raster) Raster{view, layers, {}, {}, {}};
+}
+
+static void fits(const Raster &raster, const HeldBackdrop &back) {
+    require(back.depth_array.shape(0) == size_t(raster.view.H) * back.n && back.depth_array.shape(1) == size_t(raster.view.W) * back.n,
+            "Raster: the backdrop has another size");
+}
+
+static void fits(Points points, Widths widths) {
+    require(points.shape(1) >= 2 && points.shape(1) < 1 << 15, "Raster: expected 2 to 32767 points");
+    require(widths.shape(0) == points.shape(0) && widths.shape(1) == points.shape(1), "Raster: widths do not fit points");
+    require(points.shape(0) * points.shape(1) < size_t(1) << 31, "Raster: expected fewer than 2^31 points a chunk");
+}
+
+static void count(Raster &raster, Points points, Widths widths, size_t first) {
+    fits(points, widths);
+    nb::gil_scoped_release release;
+    raster.counted.add(raster.view, points.data(), widths.data(), int(points.shape(0)), int(points.shape(1)), first, std::min(threads(), 8));
+}
+
+static void cut_off(Raster &raster, const HeldBackdrop &back) {
+    fits(raster, back);
+    nb::gil_scoped_release release;
+    raster.cut_off(back, threads());
+}
+
+static nb::ndarray<nb::numpy, uint32_t> add(Raster &raster, Points points, Widths widths) {
+    fits(points, widths);
+    require(!raster.bins.cut.empty(), "Raster.add: before cut_off");
+    require(raster.bins.waiting == raster.bins.batches.size(), "Raster.add: the last chunk has no colours");
+    const size_t S = points.shape(0), step = Bins::strands_per_batch(int(points.shape(1)));
+    require(raster.bins.batches.size() + S / step < 1u << (32 - Batch::kBits), "Raster.add: too many strands");
+    {
+        nb::gil_scoped_release release;
+        raster.bins.add(raster.view, points.data(), widths.data(), int(S), int(points.shape(1)), threads());
+    }
+    auto seen = new_array<uint32_t>({raster.bins.seen()});
+    uint32_t *to = seen.data();
+    for (size_t b = raster.bins.waiting; b < raster.bins.batches.size(); ++b)
+        to = std::copy(raster.bins.batches[b].seen.begin(), raster.bins.batches[b].seen.end(), to);
+    return seen;
+}
+
+static void colour(Raster &raster, Array<const float, -1, 3> colours) {
+    require(colours.shape(0) == raster.bins.seen(), "Raster.colour: expected a colour for each point that is seen");
+    nb::gil_scoped_release release;
+    raster.bins.colour(colours.data(), threads());
+}
+
+static int compose(Raster &raster, const HeldBackdrop &back, Picture picture) {
+    fits(raster, back);
+    require(!raster.bins.cut.empty(), "Raster.compose: before cut_off");
+    require(raster.bins.waiting == raster.bins.batches.size(), "Raster.compose: the last chunk has no colours");
+    require(picture.shape(0) == size_t(raster.view.H) && picture.shape(1) == size_t(raster.view.W), "Raster.compose: the picture has another size");
+    nb::gil_scoped_release release;
+    const int wrong = raster.compose(back, picture.data(), threads());
+    if (wrong) raster.again(back, threads());
+    return wrong;
+}
+
+void bind_raster(nb::module_ &m) {
+    nb::class_<HeldBackdrop>(m, "Backdrop")
+        .def("__init__", &make_backdrop, nb::arg("depth"), nb::arg("samples"), nb::arg("decode"), nb::arg("per_side"));
+    nb::class_<Raster>(m, "Raster")
+        .def("__init__", &make_raster, nb::arg("size"), nb::arg("matrix"), nb::arg("scale"), nb::arg("range"), nb::arg("layers"))
+        .def("count", &count, nb::arg("points"), nb::arg("widths"), nb::arg("first"))
+        .def("cut_off", &cut_off, nb::arg("backdrop"))
+        .def("add", &add, nb::arg("points"), nb::arg("widths"))
+        .def("colour", &colour, nb::arg("colours"))
+        .def("compose", &compose, nb::arg("backdrop"), nb::arg("picture"));
+}
+
+} // namespace ringlet

@@ -1,0 +1,62 @@
+// Coverage of a pixel by a segment, exact to a thousandth: 4 x 4 cells, a lane each.
+//
+// A strip of half width h covers of a cell of side s = 1/4, whose centre lies v across and u along it from its start,
+//     across = clamp((h + s/2 - |v|) / s, 0, min(1, 2h/s)),   along = clamp01((L - u)/s + 1/2) - clamp01(-u/s + 1/2),
+// the product of both: the strip filtered by a box of the cell's variance from any angle. `along` telescopes over the
+// joints of a strand. Measured against 64 x 64 samples: see the tests of the raster.
+#pragma once
+
+#include "screen.hpp"
+#include "simd.hpp"
+
+namespace ringlet {
+
+using Cells = Lanes<float>; // 4 x 4 cells of a pixel, row by row
+
+inline constexpr int kCells = 4;
+
+/// Where the cells' centres lie in the pixel, from its centre.
+struct CellCentres {
+    Cells x, y;
+
+    CellCentres() {
+        for (int i = 0; i < kCells * kCells; ++i)
+            x[i] = (i % kCells + 0.5f) / kCells - 0.5f, y[i] = (i / kCells + 0.5f) / kCells - 0.5f;
+    }
+};
+
+RINGLET_INLINE Cells clamp_cells(Cells a, float low, float high) {
+    return minimum<float>(maximum<float>(a, splat(low)), splat(high));
+}
+
+RINGLET_INLINE float sum_cells(Cells a) {
+    typedef float Half __attribute__((vector_size(32)));
+    typedef float Quarter __attribute__((vector_size(16)));
+    const Half h = __builtin_shufflevector(a, a, 0, 1, 2, 3, 4, 5, 6, 7) + __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15);
+    const Quarter q = __builtin_shufflevector(h, h, 0, 1, 2, 3) + __builtin_shufflevector(h, h, 4, 5, 6, 7);
+    return (q[0] + q[2]) + (q[1] + q[3]);
+}
+
+/// A segment where it crosses a pixel.
+struct Fragment {
+    float depth;
+    float along, across; // of the pixel's centre [px]
+    float length, half;  // of the segment [px]
+    float nx, ny;        // unit normal on the screen
+    float colour[3];
+};
+
+/// Covered part of each cell.
+RINGLET_INLINE Cells covered(const Fragment &f, const CellCentres &cell) {
+    constexpr float inverse = kCells, half_cell = 0.5f / kCells, near_end = 0.75f;
+    const Cells v = f.across + f.nx * cell.x + f.ny * cell.y;
+    const Cells apart = v < 0 ? -v : v;
+    Cells part = clamp_cells((f.half + half_cell - apart) * inverse, 0, std::min(1.0f, 2 * inverse * f.half));
+    if (f.along < near_end || f.along > f.length - near_end) {
+        const Cells u = f.along + f.ny * cell.x - f.nx * cell.y;
+        part *= clamp_cells((f.length - u) * inverse + 0.5f, 0, 1) - clamp_cells(u * -inverse + 0.5f, 0, 1);
+    }
+    return part;
+}
+
+} // namespace ringlet

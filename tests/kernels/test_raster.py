@@ -1,0 +1,192 @@
+"""Strands by coverage: exact coverage, hidden hair, the backdrop, clipping; nothing depends on chunks or threads."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import raster_twin as twin
+from numpy.typing import NDArray
+
+from pipeline import kernels
+
+F32 = NDArray[np.float32]
+
+LINEAR = (np.arange(256) / 255).astype(np.float32)
+
+
+def backdrop(height: int, width: int, per_side: int = 1, depth: Any = 1.0, level: int = 51) -> kernels.Backdrop:
+    shape = (height * per_side, width * per_side)
+    samples = np.full((*shape, 3), level, np.uint8)
+    return kernels.Backdrop(np.array(np.broadcast_to(depth, shape), np.float32), samples, LINEAR, per_side)
+
+
+def draw(
+    points: F32, widths: F32, colours: F32, size: tuple[int, int], layers: float = 30.0, chunk: int = 1000, **behind: Any
+) -> F32:
+    """The picture (H, W, 3) of strands (S, P, 3) with widths (S, P) and linear colours (S, P, 3)."""
+    width, height = size
+    back = backdrop(height, width, **behind)
+    raster = kernels.Raster(size, twin.matrix(*size), twin.scale(height), (twin.NEAR, twin.FAR), layers)
+    for first in range(0, len(points), chunk):
+        raster.count(points[first : first + chunk], widths[first : first + chunk], first)
+    raster.cut_off(back)
+    picture = np.zeros((height, width, 3), np.float32)
+    wrong = 1
+    for _ in range(2):
+        for first in range(0, len(points), chunk):
+            part = slice(first, first + chunk)
+            seen = raster.add(points[part], widths[part])
+            raster.colour(colours[part].reshape(-1, 3)[seen])
+        wrong = raster.compose(back, picture)
+        if not wrong:
+            break
+    assert not wrong
+    return picture
+
+
+def bundle(strands: int, points: int, seed: int, pixels: float, height: int) -> tuple[F32, F32, F32]:
+    """Wavy strands all over the picture, some of them deep, about so many pixels wide."""
+    random = np.random.default_rng(seed)
+    root = random.uniform([-1, -1, -0.4], [1, 1, 0.4], (strands, 3))
+    step = random.normal(0, 0.5 / points, (strands, 1, 3)) + random.normal(0, 0.25 / points, (strands, points, 3))
+    at = root[:, None] + np.cumsum(step * [1, 1, 0.3], axis=1)
+    widths = np.full((strands, points), pixels * 2 / height)
+    colours = random.uniform(0, 1, (strands, 1, 3)) + np.zeros((1, points, 1))
+    return at.astype(np.float32), widths.astype(np.float32), colours.astype(np.float32)
+
+
+@pytest.mark.parametrize("pixels", [0.1, 0.35, 0.75, 2.0])
+def test_coverage_of_one_segment_is_its_area(pixels: float) -> None:
+    size, errors = (16, 16), []
+    random = np.random.default_rng(5)
+    for _ in range(12):
+        ends = random.uniform(-0.7, 0.7, (1, 2, 3)) * [1, 1, 0]
+        points, widths = ends.astype(np.float32), np.full((1, 2), pixels * 2 / 16, np.float32)
+        white = np.ones((1, 2, 3), np.float32)
+        found = draw(points, widths, white, size, level=0)
+        errors.append(found - twin.drawn(points, widths, white, np.zeros((16, 16, 3)), 64))
+    rms, bias = np.sqrt(np.mean(np.square(errors))), np.mean(errors) / max(pixels, 1e-9)
+    print(f"{pixels} px: rms {rms:.4f}, bias {bias:.5f} of the width")
+    assert rms < 0.003
+    assert abs(bias) < 0.003
+
+
+def test_many_strands_look_as_by_16_x_16_samples() -> None:
+    points, widths, colours = bundle(700, 6, 1, 0.8, 48)
+    found = draw(points, widths, colours, (48, 48))
+    wanted = twin.drawn(points, widths, colours, np.full((48, 48, 3), 0.2), 16)
+    error = np.sqrt(np.mean((found - wanted) ** 2))
+    coarse = np.sqrt(np.mean((twin.drawn(points, widths, colours, np.full((48, 48, 3), 0.2), 4) - wanted) ** 2))
+    print(f"rms {error:.4f}; of 4 x 4 samples {coarse:.4f}")
+    assert error < coarse
+    assert abs(float(np.mean(found - wanted))) < 0.002
+
+
+def test_a_strand_is_one_band_however_many_points_it_has() -> None:
+    ends = np.array([[-0.6, -0.5, 0.1], [0.7, 0.4, -0.2]])
+    pictures = []
+    for count in (2, 33):
+        # equal parts on the screen are not equal in space: the colour is constant, so that only coverage counts
+        points = (ends[0] + np.linspace(0, 1, count)[:, None] * (ends[1] - ends[0])).astype(np.float32)[None]
+        white = np.ones((1, count, 3), np.float32)
+        pictures.append(draw(points, np.full((1, count), 0.02, np.float32), white, (40, 40)))
+    apart = float(np.abs(pictures[0] - pictures[1]).max())
+    print(f"{apart:.4f}")
+    assert apart < 0.02
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_picture_depends_neither_on_threads_nor_on_chunks(threads: int) -> None:
+    points, widths, colours = bundle(3000, 8, 2, 0.6, 64)
+    kernels.set_threads(2)
+    whole = draw(points, widths, colours, (64, 64))
+    kernels.set_threads(threads)
+    for chunk in (17, 1000, 5000):
+        assert np.array_equal(draw(points, widths, colours, (64, 64), chunk=chunk), whole), chunk
+
+
+def test_what_is_cut_off_would_not_have_been_seen() -> None:
+    """Cut off at half a layer nearly every tile is wrong at first, and drawn again."""
+    points, widths, colours = bundle(4000, 8, 3, 1.5, 64)
+    everything = draw(points, widths, colours, (64, 64), layers=1e6)
+    for layers in (0.5, 4, 20):
+        assert np.array_equal(draw(points, widths, colours, (64, 64), layers=layers), everything), layers
+
+
+def test_few_points_of_dense_hair_are_seen() -> None:
+    points, widths, _ = bundle(20000, 8, 4, 1.5, 64)
+    back = backdrop(64, 64)
+    raster = kernels.Raster((64, 64), twin.matrix(64, 64), twin.scale(64), (twin.NEAR, twin.FAR), 20.0)
+    raster.count(points, widths, 0)
+    raster.cut_off(back)
+    part = len(raster.add(points, widths)) / (points.size / 3)
+    print(f"{part:.1%} of the points")
+    assert part < 0.4
+
+
+def test_hair_behind_the_backdrop_is_hidden_to_the_sample() -> None:
+    """The backdrop is in front in the right half, whose edge goes through the middle of pixels."""
+    points = np.array([[[-0.9, 0.013, 0], [0.9, 0.013, 0]]], np.float32)
+    widths, white = np.full((1, 2), 0.4, np.float32), np.ones((1, 2, 3), np.float32)
+    depth = np.ones((1, 2 * 21), np.float32)
+    depth[:, 21:] = 0.1
+    found = draw(points, widths, white, (21, 21), per_side=2, depth=depth, level=0)
+    row = found[10, :, 0]
+    print(row.round(2))
+    assert np.allclose(row[3:10], 1, atol=1e-3)
+    assert row[10] == pytest.approx(0.5, abs=1e-3)
+    assert np.all(row[11:] == 0)
+
+
+def test_without_hair_the_backdrop_is_averaged() -> None:
+    random = np.random.default_rng(6)
+    for per_side in (1, 2, 3, 4):
+        samples = random.integers(0, 256, (8 * per_side, 8 * per_side, 3)).astype(np.uint8)
+        back = kernels.Backdrop(np.ones(samples.shape[:2], np.float32), samples, LINEAR, per_side)
+        raster = kernels.Raster((8, 8), twin.matrix(8, 8), twin.scale(8), (twin.NEAR, twin.FAR), 20.0)
+        raster.cut_off(back)
+        picture = np.zeros((8, 8, 3), np.float32)
+        assert raster.compose(back, picture) == 0
+        mean = (samples / 255).reshape(8, per_side, 8, per_side, 3).mean(axis=(1, 3))
+        assert np.abs(picture - mean).max() < 1e-6
+
+
+def test_a_strand_that_passes_the_camera_is_cut_at_the_near_plane() -> None:
+    """The part in front of it is drawn as if the rest were not there."""
+    to_camera = np.array([[[-0.9, -0.6, 0.0], [0.9, 0.5, 2.4]]])
+    part = (twin.EYE - twin.NEAR) / 2.4
+    cut = to_camera.copy()
+    cut[:, 1] = to_camera[:, 0] + part * (to_camera[:, 1] - to_camera[:, 0])
+    widths, white = np.full((1, 2), 0.1, np.float32), np.ones((1, 2, 3), np.float32)
+    whole = draw(to_camera.astype(np.float32), widths, white, (40, 40))
+    short = draw(cut.astype(np.float32), widths, white, (40, 40))
+    assert (whole > 0.5).sum() > 10
+    assert np.abs(whole - short).max() < 1e-3
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -1e30, 1e30])
+def test_broken_strands_leave_the_others_alone(bad: float) -> None:
+    points, widths, colours = bundle(50, 6, 7, 0.8, 32)
+    broken = points.copy()
+    broken[10, 3] = bad
+    broken[20] = bad
+    found, wanted = draw(broken, widths, colours, (32, 32)), draw(points, widths, colours, (32, 32))
+    assert np.isfinite(found).all()
+    assert (np.abs(found - wanted).max(axis=2) < 1e-6).mean() > 0.5
+
+
+def test_wrong_shapes_are_refused() -> None:
+    points, widths, colours = bundle(5, 6, 8, 0.8, 32)
+    raster = kernels.Raster((32, 32), twin.matrix(32, 32), twin.scale(32), (twin.NEAR, twin.FAR), 20.0)
+    with pytest.raises(ValueError, match="before cut_off"):
+        raster.add(points, widths)
+    with pytest.raises(ValueError, match="another size"):
+        raster.cut_off(backdrop(16, 16))
+    raster.cut_off(backdrop(32, 32))
+    with pytest.raises(ValueError, match="do not fit"):
+        raster.add(points, widths[:, 1:].copy())
+    raster.add(points, widths)
+    with pytest.raises(ValueError, match="no colours"):
+        raster.add(points, widths)
+    with pytest.raises(ValueError, match="a colour for each"):
+        raster.colour(colours[0, :1])
