@@ -21,7 +21,7 @@ def bench(
     strands: int = 1_000_000,
     points: int = 16,
     size: tuple[int, int] = (1920, 1080),
-    geometry: str = "lines",
+    geometry: str = "auto",
     samples: int = 2,
 ) -> dict[str, Any]:
     """Render frames of a swinging head of hair as the stage does.

@@ -128,7 +128,7 @@ def bench_render(
     strands: Count = 1_000_000,
     points: Count = 16,
     size: Annotated[str, Parameter(help="Width x height [px].")] = "1920x1080",
-    geometry: Literal["auto", "tubes", "ribbons", "lines"] = "lines",
+    geometry: Literal["auto", "coverage", "tubes", "ribbons", "lines"] = "auto",
     samples: Annotated[int, Parameter(help="N for N x N supersampling.")] = 2,
     json: Json = False,
 ) -> None:

@@ -680,6 +680,7 @@ def shade(
     eye: _F64,
     light: Illumination,
     tables: FibreTables,
+    which: NDArray[np.uint32] | None = None,
 ) -> _F32:
     """Radiance of strands towards the eye.
 
@@ -690,9 +691,10 @@ def shade(
         eye: (3,) float64 [m].
         light: lights and sky.
         tables: scattering of one fibre.
+        which: (n,) uint32, which of the S * P points; all of them by default.
 
     Returns:
-        (S, P, 3) float32, linear R, G, B.
+        (n, 3) float32, linear R, G, B.
 
     """
 
@@ -719,19 +721,80 @@ def shade_surface(
 
 # --- pixels (develop.hpp) ---------------------------------------------------------------------------
 
-def develop(
-    samples: NDArray[np.uint8], per_side: int, decode: _F32, encode: NDArray[np.uint8], scale: float
-) -> NDArray[np.uint8]:
-    """Pixels (H, W, 3) uint8 of samples (H n, W n, 3) uint8, averaged over n x n = per_side x per_side.
+def average(samples: NDArray[np.uint8], per_side: int, decode: _F32) -> _F32:
+    """Linear pixels (H, W, 3) float32 of encoded samples (H n, W n, 3), averaged over n x n = per_side x per_side.
 
     Args:
-        samples: encoded samples.
+        samples: uint8.
         per_side: n >= 1.
         decode: (256,) float32, linear value of each byte.
-        encode: (K,) uint8, byte for scale * linear value, rounded down; values beyond the last entry take it.
-        scale: >= 0.
 
     Raises:
         ValueError: shapes that do not fit.
 
     """
+
+def develop(linear: _F32, encode: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
+    """Pixels (H, W, 3) uint8 of linear ones (H, W, 3) float32.
+
+    Args:
+        linear: of any size; below 0 they are black.
+        encode: (K,) uint8, byte for scale * linear value, rounded down; values beyond the last entry take it.
+        scale: >= 0.
+
+    """
+
+# --- strands by coverage (raster.hpp) ---------------------------------------------------------------
+
+class Backdrop:
+    """What lies behind the hair of a picture of W x H pixels, n x n samples a pixel, top row first."""
+
+    def __init__(self, depth: _F32, samples: NDArray[np.uint8], decode: _F32, per_side: int) -> None:
+        """The arrays are held, not copied.
+
+        Args:
+            depth: (H n, W n) float32, 0 at the near plane, 1 at the far one, more where there is nothing.
+            samples: (H n, W n, 3) uint8, encoded.
+            decode: (256,) float32, linear value of each byte.
+            per_side: n, 1 to 8.
+
+        """
+
+class Raster:
+    """Strands of a picture by exact coverage: `count` some or all, `cut_off`, then `add` and `colour` all, `compose`.
+
+    Strands come in chunks of any size, in the same order each time. No result depends on chunks or threads.
+    """
+
+    def __init__(
+        self, size: tuple[int, int], matrix: _F64, scale: float, planes: tuple[float, float], layers: float
+    ) -> None:
+        """Start a picture.
+
+        Args:
+            size: width and height [px].
+            matrix: (4, 4) float64, world [m] to clip space, as OpenGL has it.
+            scale: half width [px] that a unit radius has at unit distance.
+            planes: distances [m] of the near and the far plane.
+            layers: of hair behind which nothing is expected to be seen; a guess that costs time, never the picture.
+
+        """
+
+    def count(self, points: _F32, widths: _F32, first: int) -> None:
+        """Learn how deep hair is seen from strands (S, P, 3) [m] with widths (S, P) [m]; `first` is the first's number."""
+
+    def cut_off(self, backdrop: Backdrop) -> None:
+        """End counting: hair behind enough hair, or behind the backdrop, is not looked at."""
+
+    def add(self, points: _F32, widths: _F32) -> NDArray[np.uint32]:
+        """Add strands (S, P, 3) with widths (S, P); returns which of their S * P points are seen, (n,), ascending."""
+
+    def colour(self, colours: _F32) -> None:
+        """Give the points that the last `add` returned their linear RGB (n, 3)."""
+
+    def compose(self, backdrop: Backdrop, picture: _F32) -> int:
+        """Draw what was added over the backdrop into a picture (H, W, 3), linear RGB.
+
+        Returns how many tiles lack hair that was cut off too early. If there are any, `add` and `colour` all strands
+        once more and compose again: only those tiles are drawn, with nothing cut off.
+        """

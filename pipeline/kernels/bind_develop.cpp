@@ -5,26 +5,34 @@
 
 namespace ringlet {
 
-static nb::ndarray<nb::numpy, uint8_t> develop_pixels(Array<const uint8_t, -1, -1, 3> samples, int per_side,
-                                                      Array<const float, 256> decode, Array<const uint8_t, -1> encode,
-                                                      float scale) {
-    require(per_side >= 1, "develop: expected per_side >= 1");
+static nb::ndarray<nb::numpy, float> average_samples(Array<const uint8_t, -1, -1, 3> samples, int per_side,
+                                                     Array<const float, 256> decode) {
+    require(per_side >= 1, "average: expected per_side >= 1");
     require(samples.shape(0) % per_side == 0 && samples.shape(1) % per_side == 0,
-            "develop: samples are not a multiple of per_side");
+            "average: samples are not a multiple of per_side");
+    const size_t H = samples.shape(0) / per_side, W = samples.shape(1) / per_side;
+    auto pixels = new_array<float>({H, W, size_t(3)});
+    float *out = pixels.data();
+    nb::gil_scoped_release release;
+    average(samples.data(), out, H, W, per_side, decode.data(), threads());
+    return pixels;
+}
+
+static nb::ndarray<nb::numpy, uint8_t> develop_pixels(Array<const float, -1, -1, 3> linear, Array<const uint8_t, -1> encode,
+                                                      float scale) {
     require(encode.shape(0) >= 1 && encode.shape(0) < size_t(1) << 24, "develop: expected 1 to 2^24 entries in encode");
     require(scale >= 0, "develop: expected a scale >= 0");
-    const size_t H = samples.shape(0) / per_side, W = samples.shape(1) / per_side;
-    auto pixels = new_array<uint8_t>({H, W, size_t(3)});
-    const ToneCurve tone{decode.data(), encode.data(), int(encode.shape(0)), scale};
+    auto pixels = new_array<uint8_t>({linear.shape(0), linear.shape(1), size_t(3)});
+    const ToneCurve tone{encode.data(), int(encode.shape(0)), scale};
     uint8_t *out = pixels.data();
     nb::gil_scoped_release release;
-    develop(samples.data(), out, H, W, per_side, tone, threads());
+    develop(linear.data(), out, linear.size(), tone, threads());
     return pixels;
 }
 
 void bind_develop(nb::module_ &m) {
-    m.def("develop", &develop_pixels, nb::arg("samples"), nb::arg("per_side"), nb::arg("decode"), nb::arg("encode"),
-          nb::arg("scale"));
+    m.def("average", &average_samples, nb::arg("samples"), nb::arg("per_side"), nb::arg("decode"));
+    m.def("develop", &develop_pixels, nb::arg("linear"), nb::arg("encode"), nb::arg("scale"));
 }
 
 } // namespace ringlet

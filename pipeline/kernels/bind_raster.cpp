@@ -28,12 +28,12 @@ static void make_backdrop(HeldBackdrop *held, Widths depth, Array<const uint8_t,
 }
 
 static void make_raster(Raster *raster, std::array<int, 2> size, Array<const double, 4, 4> matrix, double scale,
-                        std::array<double, 2> range, float layers) {
+                        std::array<double, 2> planes, float layers) {
     require(size[0] >= 1 && size[1] >= 1 && size[0] <= 1 << 15 && size[1] <= 1 << 15, "Raster: expected a size of 1 to 32768");
-    require(range[0] > 0 && range[1] > range[0] && std::isfinite(range[1]), "Raster: expected 0 < near < far");
+    require(planes[0] > 0 && planes[1] > planes[0] && std::isfinite(planes[1]), "Raster: expected 0 < near < far");
     require(scale > 0 && std::isfinite(scale), "Raster: expected a positive scale");
     require(layers > 0, "Raster: expected a positive number of layers");
-    View view{{}, size[0], size[1], float(scale), float(range[0]), float(range[1])};
+    View view{{}, size[0], size[1], float(scale), float(planes[0]), float(planes[1])};
     for (int i = 0; i < 16; ++i) view.M[i / 4][i % 4] = float(matrix.data()[i]);
     new (raster) Raster{view, layers, {}, {}, {}};
 }
@@ -99,7 +99,7 @@ void bind_raster(nb::module_ &m) {
     nb::class_<HeldBackdrop>(m, "Backdrop")
         .def("__init__", &make_backdrop, nb::arg("depth"), nb::arg("samples"), nb::arg("decode"), nb::arg("per_side"));
     nb::class_<Raster>(m, "Raster")
-        .def("__init__", &make_raster, nb::arg("size"), nb::arg("matrix"), nb::arg("scale"), nb::arg("range"), nb::arg("layers"))
+        .def("__init__", &make_raster, nb::arg("size"), nb::arg("matrix"), nb::arg("scale"), nb::arg("planes"), nb::arg("layers"))
         .def("count", &count, nb::arg("points"), nb::arg("widths"), nb::arg("first"))
         .def("cut_off", &cut_off, nb::arg("backdrop"))
         .def("add", &add, nb::arg("points"), nb::arg("widths"))

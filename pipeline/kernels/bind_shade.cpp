@@ -77,16 +77,19 @@ static void make_light(HeldLight *held, Triples directions, Triples irradiance, 
 }
 
 static Radiance shade_strands(Strands points, Triples absorption, Array<const uint32_t, -1> key, Point eye,
-                              const HeldLight &light, const HeldTables &tables) {
+                              const HeldLight &light, const HeldTables &tables,
+                              std::optional<Array<const uint32_t, -1>> which) {
     const size_t S = points.shape(0), P = points.shape(1);
     require(P >= 2, "shade: expected 2 or more points");
     require(absorption.shape(0) == S && key.shape(0) == S, "shade: absorption and key do not fit points");
-    auto radiance = new_array<float>({S, P, size_t(3)});
+    const size_t count = which ? which->shape(0) : S * P;
+    for (size_t i = 0; which && i < count; ++i) require(which->data()[i] < S * P, "shade: which has a point beyond the last one");
+    auto radiance = new_array<float>({count, size_t(3)});
     const double *e = eye.data();
-    const StrandPoints strands{points.data(), absorption.data(), key.data(), int(P), {e[0], e[1], e[2]}};
+    const StrandPoints strands{points.data(), absorption.data(), key.data(), which ? which->data() : nullptr, int(P), {e[0], e[1], e[2]}};
     float *out = radiance.data();
     nb::gil_scoped_release release;
-    shade(strands, S * P, light, tables, out, threads());
+    shade(strands, count, light, tables, out, threads());
     return radiance;
 }
 
@@ -127,7 +130,8 @@ void bind_shade(nb::module_ &m) {
     nb::class_<HeldSurface>(m, "Surface")
         .def("__init__", &make_surface, nb::arg("points"), nb::arg("normals"), nb::arg("albedo"));
     m.def("shade", &shade_strands, nb::arg("points"), nb::arg("absorption"), nb::arg("key"), nb::arg("eye"),
-          nb::arg("light"), nb::arg("tables"));
+          nb::arg("light"), nb::arg("tables"),
+          nb::arg("which") = nb::none());
     m.def("shade_surface", &shade_head, nb::arg("surface"), nb::arg("eye"), nb::arg("light"), nb::arg("field").none(),
           nb::arg("pose"), nb::arg("loss"));
 }

@@ -21,6 +21,7 @@ struct StrandPoints {
     const float *points;     // (S, P, 3)
     const float *absorption; // (S, 3)
     const uint32_t *key;     // (S,)
+    const uint32_t *which;   // (count,) points that are shaded; null: all of them
     int P;
     double eye[3];
 };
@@ -42,7 +43,7 @@ inline FibrePoints gather(const StrandPoints &strands, size_t first, size_t coun
     float position[3][16], tangent[3][16], sigma[3][16];
     uint32_t point[16], patch[16];
     for (int i = 0; i < 16; ++i) {
-        const size_t index = std::min(first + i, count - 1), s = index / strands.P;
+        const size_t k = std::min(first + i, count - 1), index = strands.which ? strands.which[k] : k, s = index / strands.P;
         const int j = int(index - s * strands.P);
         const float *at = strands.points + 3 * index, *root = at - 3 * j;
         const float *before = j > 0 ? at - 3 : at, *after = j + 1 < strands.P ? at + 3 : at;
@@ -180,7 +181,7 @@ inline void light_block(FibrePoints &p, const Illumination &light, const FibreTa
     for (int l = 0; l < light.lights; ++l) add_light(p, light, l, tables, normal, radiance);
 }
 
-/// Fills `radiance` (S, P, 3) of S * P = count points.
+/// Fills `radiance` (count, 3) of the points that are wanted.
 inline void shade(const StrandPoints &strands, size_t count, const Illumination &light, const FibreTables &tables,
                   float *radiance, int threads) {
     const ptrdiff_t blocks = ptrdiff_t((count + 15) / 16);

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.config.schema import Config
+from pipeline.render.coverage import Coverage
 from pipeline.render.geometry import (
     Shape,
     choose_shape,
@@ -19,7 +20,7 @@ from pipeline.render.geometry import (
 )
 from pipeline.render.lighting import Lighting
 from pipeline.render.target import Target
-from pipeline.render.tone import before_roll_off, develop
+from pipeline.render.tone import average, before_roll_off, develop
 from pipeline.strands.expand import Expansion, MovedSkin
 from pipeline.strands.random import normal
 
@@ -93,33 +94,51 @@ class FrameRenderer:
         # Whole margins: the grid of shadows stands still while hair moves a little, so that nothing shimmers
         lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
         upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
-        kept = self._light(moment, lower, upper)
-        corners = self._corners(moment, lower, upper)
-        self.target.clear(self.camera, *self._depths(corners))
-        skin = moment.skin or self.skin
-        if skin is not None:
-            self._draw_head(skin, moment.pose)
+        self.target.clear(self.camera, *self._depths(self._corners(moment, lower, upper)))
         shape, pixels = self.shape(moment)
-        wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
-        veil = self.lighting.veil(self.eye, wider)
-        for first, points in kept or self._chunks():
-            self._draw_strands(shape, first, points, veil.visible(points))
-        return develop(self.target.read(), self.render.samples, self.render.exposure)
+        coverage = (
+            Coverage(self.target, self.render.size, self.camera, pixels) if shape == "coverage" else None
+        )
+        kept = self._light(moment, lower, upper, coverage)
+        self._draw_head(moment)
+        if coverage is not None:
+            linear = coverage.draw(
+                lambda: kept or self._chunks(), self._own_widths, self.render.subdivide, self._shade
+            )
+        else:
+            wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
+            veil = self.lighting.veil(self.eye, wider)
+            for first, points in kept or self._chunks():
+                self._draw_strands(shape, first, points, veil.visible(points))
+            linear = average(self.target.read(), self.render.samples)
+        return develop(linear, self.render.exposure)
 
     def _light(
-        self, moment: Moment, lower: NDArray[np.float64], upper: NDArray[np.float64]
+        self,
+        moment: Moment,
+        lower: NDArray[np.float64],
+        upper: NDArray[np.float64],
+        coverage: Coverage | None,
     ) -> list[tuple[int, Points]]:
         """First pass: all strands into the density grid; returns their points where they are few enough to keep."""
         keep = self.strands.count * self.strands.points * 12 <= _KEPT
         kept: list[tuple[int, Points]] = []
         self.lighting.begin(lower, upper, self.width)
         for first, points in self._chunks(reuse=not keep):
-            self.lighting.add(points, self._widths(points.shape[0], points.shape[1]))
+            widths = self._own_widths(points)
+            self.lighting.add(points, widths)
+            if coverage is not None:
+                coverage.count(first, points, widths)
             if keep:
                 kept.append((first, points))
         skin = moment.skin or self.skin
         self.lighting.finish(skin.field if skin else None, moment.pose)
         return kept
+
+    def _shade(self, first: int, points: Points, which: NDArray[np.uint32]) -> Points:
+        """Linear RGB (n, 3) of points (n,), flat indices, of strands (S, P, 3) from number `first` on."""
+        own = slice(first, first + len(points))
+        return self.lighting.shade(points, self.melanin[own], self.key[own], self.eye, which)
 
     def _chunks(self, reuse: bool = True) -> Iterator[tuple[int, Points]]:
         buffer: Points | None = None
@@ -129,19 +148,26 @@ class FrameRenderer:
                 buffer = np.empty((last - first, self.strands.points, 3), np.float32)
             yield first, self.strands.chunk(first, last, buffer)
 
-    def _widths(self, strands: int, points: int) -> NDArray[np.float32]:
-        profile = np.float32(self.width) * taper(self.render, points)
-        return np.ascontiguousarray(np.broadcast_to(profile, (strands, points)))
+    def _own_widths(self, points: Points) -> NDArray[np.float32]:
+        """Widths (S, P) [m] of strands (S, P, 3)."""
+        profile = np.float32(self.width) * taper(self.render, points.shape[1])
+        return np.ascontiguousarray(np.broadcast_to(profile, points.shape[:2]))
 
     def _draw_strands(self, shape: Shape, first: int, points: Points, visible: NDArray[np.bool_]) -> None:
         """Shade and draw what is visible of strands (S, P, 3); `visible` is (S, P)."""
         seen = np.flatnonzero(visible.any(axis=1))
         if len(seen) == 0:
             return
-        own = first + seen
-        points = np.ascontiguousarray(points[seen])
-        colours = self.lighting.shade(points, self.melanin[own], self.key[own], self.eye)
         segments = visible[seen, :-1] | visible[seen, 1:]
+        wanted = np.zeros((len(seen), points.shape[1]), bool)
+        wanted[:, :-1] |= segments
+        wanted[:, 1:] |= segments
+        own, points = first + seen, np.ascontiguousarray(points[seen])
+        colours = np.zeros_like(points)
+        which = np.flatnonzero(wanted).astype(np.uint32)
+        colours.reshape(-1, 3)[which] = self.lighting.shade(
+            points, self.melanin[own], self.key[own], self.eye, which
+        )
         pieces = self.render.subdivide
         if pieces > 1:
             points, colours = smooth(points, pieces), _between(colours, pieces)
@@ -149,14 +175,19 @@ class FrameRenderer:
         if shape == "lines":
             self.target.lines(points, colours, segments)
             return
-        widths = self._widths(points.shape[0], points.shape[1])
+        widths = self._own_widths(points)
         if shape == "tubes":
             self.target.tubes(points, colours, widths, self.render.tube_sides)
             return
         edges, triangles = ribbons(points, widths, self.eye, segments)
         self.target.triangles(edges.reshape(-1, 3), triangles, np.repeat(colours.reshape(-1, 3), 2, axis=0))
 
-    def _draw_head(self, skin: Skin, pose: NDArray[np.float64]) -> None:
+    def _draw_head(self, moment: Moment) -> None:
+        """Draw the head, or where there is none the background."""
+        skin, pose = moment.skin or self.skin, moment.pose
+        if skin is None:
+            self.target.background()
+            return
         rotation = pose[:3, :3]
         points = np.ascontiguousarray(skin.points @ rotation.T + pose[:3, 3], np.float32)
         normals = np.ascontiguousarray(skin.normals @ rotation.T, np.float32)

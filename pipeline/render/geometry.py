@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from pipeline.config.schema import Camera, Render
 
 Points = NDArray[np.float32]
-Shape = Literal["tubes", "ribbons", "lines"]
+Shape = Literal["tubes", "ribbons", "lines", "coverage"]
 
-RIBBONS_FROM, TUBES_FROM = 1.0, 3.0  # [px] projected widths where `auto` changes
+TUBES_FROM = 3.0  # [px] projected width where `auto` changes from coverage to tubes: from there on their roundness shows
 
 _FIBRE = 80e-6  # [m] a human hair's diameter
 _FULL = 100_000  # strands of a full head
@@ -35,9 +35,7 @@ def choose_shape(render: Render, pixels: float) -> Shape:
     """The shape that the config asks for, or the one that fits a projected width [px]."""
     if render.geometry != "auto":
         return render.geometry
-    if pixels >= TUBES_FROM:
-        return "tubes"
-    return "ribbons" if pixels >= RIBBONS_FROM else "lines"
+    return "tubes" if pixels >= TUBES_FROM else "coverage"
 
 
 def taper(render: Render, points: int) -> NDArray[np.float32]:

@@ -130,10 +130,15 @@ class Lighting:
         density = np.float32(wider) * frame.hair + np.float32(_OPAQUE) * frame.body
         return Veil(density, np.array(frame.light.origin), frame.light.spacing, eye)
 
-    def shade(self, points: _F32, melanin: _F32, key: NDArray[np.uint32], eye: _F64) -> _F32:
-        """Linear RGB (S, P, 3) float32 of strands (S, P, 3) with melanin (S,) and key (S,) as seen from `eye` (3,)."""
+    def shade(
+        self, points: _F32, melanin: _F32, key: NDArray[np.uint32], eye: _F64, which: NDArray[np.uint32]
+    ) -> _F32:
+        """Linear RGB (n, 3) float32, as seen from `eye` (3,), of points (n,), flat indices, of strands (S, P, 3).
+
+        The strands have melanin (S,) and random keys (S,).
+        """
         absorption = fibre.absorption(melanin, self._hair.redness)
-        return kernels.shade(points, absorption, key, eye, self._finished().light, self._tables)
+        return kernels.shade(points, absorption, key, eye, self._finished().light, self._tables, which)
 
     def shade_surface(self, points: _F32, normals: _F32, albedo: _F32, eye: _F64) -> _F32:
         """Linear RGB (N, 3) float32 of points of the head (N, 3), with unit normals and linear albedo (N, 3)."""

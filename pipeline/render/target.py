@@ -65,6 +65,10 @@ class Target:
         self._renderer.PreserveColorBufferOff()
         self._renderer.PreserveDepthBufferOff()
 
+    def background(self) -> None:
+        """Draw nothing but the background."""
+        self._draw(self._vtk.vtkPolyData())
+
     def triangles(self, points: Points, triangles: NDArray[np.integer[Any]], colours: Colours) -> None:
         """Draw triangles (T, 3) over points (N, 3) [m] with linear colours (N, 3)."""
         mesh = self._poly_data(points, colours)
@@ -108,6 +112,27 @@ class Target:
         pixels = self._vtk.vtkUnsignedCharArray()
         self._window.GetPixelData(0, 0, self.width - 1, self.height - 1, 0, pixels, 0)
         return np.asarray(vtk_to_numpy(pixels)).reshape(self.height, self.width, 3)[::-1]
+
+    def depth(self) -> NDArray[np.float32]:
+        """Depth of the framebuffer (H, W), top row first: 0 at the near plane, 1 at the far one, 2 where nothing is."""
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+
+        values = self._vtk.vtkFloatArray()
+        self._window.GetZbufferData(0, 0, self.width - 1, self.height - 1, values)
+        depth = np.array(np.asarray(vtk_to_numpy(values)).reshape(self.height, self.width)[::-1])
+        depth[depth >= 1] = 2
+        return depth
+
+    def matrix(self) -> NDArray[np.float64]:
+        """World [m] to clip space (4, 4), of the camera of the last `clear`."""
+        aspect = self._renderer.GetTiledAspectRatio()
+        matrix = self._renderer.GetActiveCamera().GetCompositeProjectionTransformMatrix(aspect, -1, 1)
+        return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+
+    def planes(self) -> tuple[float, float]:
+        """Distances [m] of the near and the far plane."""
+        near, far = self._renderer.GetActiveCamera().GetClippingRange()
+        return float(near), float(far)
 
     @property
     def renderer_name(self) -> str:

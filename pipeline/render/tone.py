@@ -1,4 +1,4 @@
-"""From samples in the framebuffer to pixels: decode, average, expose, sRGB."""
+"""From samples in the framebuffer to linear pixels, and from those to sRGB: decode, average, expose, encode."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +11,14 @@ SHOULDER, WHITE = 0.6, 1.4
 _STEPS = 1 << 15
 
 
-def develop(samples: NDArray[np.uint8], per_side: int, exposure: float) -> NDArray[np.uint8]:
-    """Pixels (H, W, 3) sRGB of encoded samples (H n, W n, 3), averaged over n x n in linear light.
+def average(samples: NDArray[np.uint8], per_side: int) -> NDArray[np.float32]:
+    """Linear pixels (H, W, 3) of encoded samples (H n, W n, 3), averaged over n x n in linear light."""
+    return kernels.average(np.ascontiguousarray(samples), per_side, DECODED)
 
-    Highlights roll off instead of clipping, see `roll_off`.
-    """
-    flat = np.ascontiguousarray(samples)
-    return kernels.develop(flat, per_side, DECODED, _SRGB, exposure * (_STEPS - 1) / WHITE)
+
+def develop(linear: NDArray[np.float32], exposure: float) -> NDArray[np.uint8]:
+    """Pixels (H, W, 3) sRGB of linear ones. Highlights roll off instead of clipping, see `roll_off`."""
+    return kernels.develop(np.ascontiguousarray(linear), _SRGB, exposure * (_STEPS - 1) / WHITE)
 
 
 def roll_off(linear: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,7 +16,12 @@ def matrix(width: int, height: int) -> Floats:
         [
             [slope * height / width, 0, 0, 0],
             [0, slope, 0, 0],
-            [0, 0, -(FAR + NEAR) / (FAR - NEAR), EYE * (FAR + NEAR) / (FAR - NEAR) - 2 * FAR * NEAR / (FAR - NEAR)],
+            [
+                0,
+                0,
+                -(FAR + NEAR) / (FAR - NEAR),
+                EYE * (FAR + NEAR) / (FAR - NEAR) - 2 * FAR * NEAR / (FAR - NEAR),
+            ],
             [0, 0, -1, EYE],
         ]
     )
@@ -29,7 +34,10 @@ def scale(height: int) -> float:
 
 def project(points: NDArray[np.float32], width: int, height: int) -> tuple[Floats, Floats]:
     """Screen positions (..., 2) [px] and distances (...,) [m]."""
-    x = np.concatenate([points.astype(float), np.ones((*points.shape[:-1], 1))], axis=-1) @ matrix(width, height).T
+    x = (
+        np.concatenate([points.astype(float), np.ones((*points.shape[:-1], 1))], axis=-1)
+        @ matrix(width, height).T
+    )
     w = x[..., 3]
     return np.stack([(x[..., 0] / w + 1) * width / 2, (1 - x[..., 1] / w) * height / 2], axis=-1), w
 
@@ -51,12 +59,16 @@ def drawn(
     for s in range(len(points)):
         for j in range(points.shape[1] - 1):
             a, b = at[s, j], at[s, j + 1]
-            length = np.linalg.norm(b - a)
-            u = ((x - a[0]) * (b - a)[0] + (y - a[1]) * (b - a)[1]) / length**2
-            v = np.abs((x - a[0]) * (b - a)[1] - (y - a[1]) * (b - a)[0]) / length
+            length, reach = np.linalg.norm(b - a), half[s, j : j + 2].max() + 1
+            low, high = (np.minimum(a, b) - reach) * per_side, (np.maximum(a, b) + reach) * per_side
+            box = tuple(slice(max(int(low[k]), 0), max(int(high[k]), 0)) for k in (1, 0))
+            u = ((x[box] - a[0]) * (b - a)[0] + (y[box] - a[1]) * (b - a)[1]) / length**2
+            v = np.abs((x[box] - a[0]) * (b - a)[1] - (y[box] - a[1]) * (b - a)[0]) / length
             depth = 1 / (1 / w[s, j] + u * (1 / w[s, j + 1] - 1 / w[s, j]))
             wide = half[s, j] + u * (half[s, j + 1] - half[s, j])
-            inside = (u >= 0) & (u < 1) & (v <= wide) & (depth < nearest)
-            nearest[inside] = depth[inside]
-            picture[inside] = (colours[s, j] + u[..., None] * (colours[s, j + 1] - colours[s, j]))[inside]
+            inside = (u >= 0) & (u < 1) & (v <= wide) & (depth < nearest[box])
+            nearest[box][inside] = depth[inside]
+            picture[box][inside] = (colours[s, j] + u[..., None] * (colours[s, j + 1] - colours[s, j]))[
+                inside
+            ]
     return picture.reshape(height, per_side, width, per_side, 3).mean(axis=(1, 3))

@@ -14,14 +14,22 @@ F32 = NDArray[np.float32]
 LINEAR = (np.arange(256) / 255).astype(np.float32)
 
 
-def backdrop(height: int, width: int, per_side: int = 1, depth: Any = 1.0, level: int = 51) -> kernels.Backdrop:
+def backdrop(
+    height: int, width: int, per_side: int = 1, depth: Any = 1.0, level: int = 51
+) -> kernels.Backdrop:
     shape = (height * per_side, width * per_side)
     samples = np.full((*shape, 3), level, np.uint8)
     return kernels.Backdrop(np.array(np.broadcast_to(depth, shape), np.float32), samples, LINEAR, per_side)
 
 
 def draw(
-    points: F32, widths: F32, colours: F32, size: tuple[int, int], layers: float = 30.0, chunk: int = 1000, **behind: Any
+    points: F32,
+    widths: F32,
+    colours: F32,
+    size: tuple[int, int],
+    layers: float = 30.0,
+    chunk: int = 1000,
+    **behind: Any,
 ) -> F32:
     """The picture (H, W, 3) of strands (S, P, 3) with widths (S, P) and linear colours (S, P, 3)."""
     width, height = size
@@ -48,7 +56,9 @@ def bundle(strands: int, points: int, seed: int, pixels: float, height: int) -> 
     """Wavy strands all over the picture, some of them deep, about so many pixels wide."""
     random = np.random.default_rng(seed)
     root = random.uniform([-1, -1, -0.4], [1, 1, 0.4], (strands, 3))
-    step = random.normal(0, 0.5 / points, (strands, 1, 3)) + random.normal(0, 0.25 / points, (strands, points, 3))
+    step = random.normal(0, 0.5 / points, (strands, 1, 3)) + random.normal(
+        0, 0.25 / points, (strands, points, 3)
+    )
     at = root[:, None] + np.cumsum(step * [1, 1, 0.3], axis=1)
     widths = np.full((strands, points), pixels * 2 / height)
     colours = random.uniform(0, 1, (strands, 1, 3)) + np.zeros((1, points, 1))
@@ -76,7 +86,9 @@ def test_many_strands_look_as_by_16_x_16_samples() -> None:
     found = draw(points, widths, colours, (48, 48))
     wanted = twin.drawn(points, widths, colours, np.full((48, 48, 3), 0.2), 16)
     error = np.sqrt(np.mean((found - wanted) ** 2))
-    coarse = np.sqrt(np.mean((twin.drawn(points, widths, colours, np.full((48, 48, 3), 0.2), 4) - wanted) ** 2))
+    coarse = np.sqrt(
+        np.mean((twin.drawn(points, widths, colours, np.full((48, 48, 3), 0.2), 4) - wanted) ** 2)
+    )
     print(f"rms {error:.4f}; of 4 x 4 samples {coarse:.4f}")
     assert error < coarse
     assert abs(float(np.mean(found - wanted))) < 0.002

@@ -62,7 +62,9 @@ def radiance(tangents: _F64, eye: _F64, light: kernels.Illumination, sigma: _F32
     points = np.stack([-tangents, tangents], axis=1).astype(np.float32) * np.float32(1e-3)
     absorption = np.ascontiguousarray(np.broadcast_to(np.float32(sigma), (len(tangents), 3)))
     key = np.arange(len(tangents), dtype=np.uint32)
-    return kernels.shade(points, absorption, key, FAR * eye, light, SCATTERING.tables())[:, 0]
+    return kernels.shade(points, absorption, key, FAR * eye, light, SCATTERING.tables()).reshape(
+        *points.shape
+    )[:, 0]
 
 
 def along(sine_i: _F64, sine_o: _F64, v: float | _F64) -> _F64:
@@ -235,7 +237,10 @@ def test_shading_does_not_depend_on_threads_or_company() -> None:
     assert np.array_equal(kernels.shade(points, sigma, key, eye, light, tables), alone)
     kernels.set_threads(before)
     part = kernels.shade(points[50:90], sigma[50:90], key[50:90], eye, light, tables)
-    assert np.array_equal(part, alone[50:90])
+    count = points.shape[1]
+    assert np.array_equal(part, alone[50 * count : 90 * count])
+    some = np.arange(7, len(alone), 11, dtype=np.uint32)
+    assert np.array_equal(kernels.shade(points, sigma, key, eye, light, tables, some), alone[some])
 
 
 def test_broken_strands_give_finite_colours() -> None:
@@ -245,7 +250,7 @@ def test_broken_strands_give_finite_colours() -> None:
     light = Room(n=0.5, behind=1.0).light(spread(2))
     sigma, key = np.full((3, 3), 0.5, np.float32), np.zeros(3, np.uint32)
     shaded = kernels.shade(points, sigma, key, np.array([0.0, 0, 1]), light, SCATTERING.tables())
-    assert np.isfinite(shaded[0]).all()
+    assert np.isfinite(shaded[:4]).all()
 
 
 def test_wrong_arrays_are_refused() -> None:
@@ -255,3 +260,6 @@ def test_wrong_arrays_are_refused() -> None:
         kernels.shade(points, np.zeros((3, 3), np.float32), key, np.zeros(3), light, tables)
     with pytest.raises(ValueError, match="2 or more points"):
         kernels.shade(points[:, :1].copy(), np.zeros((2, 3), np.float32), key, np.zeros(3), light, tables)
+    with pytest.raises(ValueError, match="beyond the last"):
+        beyond = np.array([8], np.uint32)
+        kernels.shade(points, np.zeros((2, 3), np.float32), key, np.zeros(3), light, tables, beyond)

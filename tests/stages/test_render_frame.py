@@ -85,7 +85,7 @@ def test_the_background_has_the_colour_of_the_config() -> None:
     assert np.abs(corner - wanted).max() <= 3
 
 
-@pytest.mark.parametrize("geometry", ["lines", "ribbons", "tubes"])
+@pytest.mark.parametrize("geometry", ["coverage", "lines", "ribbons", "tubes"])
 def test_any_chunking_gives_the_same_pixels(geometry: str, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = config(geometry=geometry, width=1e-3)
     whole = render(settings, hanging(40))
@@ -95,7 +95,7 @@ def test_any_chunking_gives_the_same_pixels(geometry: str, monkeypatch: pytest.M
     assert np.array_equal(render(settings, hanging(40)), whole)
 
 
-@pytest.mark.parametrize("geometry", ["ribbons", "tubes"])
+@pytest.mark.parametrize("geometry", ["coverage", "ribbons", "tubes"])
 def test_a_strand_is_as_wide_as_it_should_be(geometry: str) -> None:
     settings = config(geometry=geometry, width=0.01, taper=0, samples=4)
     picture = render(settings, hanging(1)).astype(int)

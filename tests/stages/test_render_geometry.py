@@ -6,15 +6,13 @@ import pytest
 from pipeline.config.schema import Camera, Render
 from pipeline.render.geometry import choose_shape, drawn_width, projected_width, ribbons, smooth, taper
 from pipeline.render.target import BRIGHTEST, DECODED, encode
-from pipeline.render.tone import SHOULDER, WHITE, before_roll_off, develop, roll_off, to_srgb
+from pipeline.render.tone import SHOULDER, WHITE, average, before_roll_off, develop, roll_off, to_srgb
 
 
-@pytest.mark.parametrize(
-    ("pixels", "shape"), [(0.2, "lines"), (0.99, "lines"), (1.5, "ribbons"), (3.5, "tubes")]
-)
+@pytest.mark.parametrize(("pixels", "shape"), [(0.2, "coverage"), (1.5, "coverage"), (3.5, "tubes")])
 def test_auto_draws_by_projected_width(pixels: float, shape: str) -> None:
     assert choose_shape(Render(), pixels) == shape
-    assert choose_shape(Render(geometry="tubes"), pixels) == "tubes"
+    assert choose_shape(Render(geometry="lines"), pixels) == "lines"
 
 
 def test_projected_width_is_that_of_a_pinhole_camera() -> None:
@@ -74,7 +72,7 @@ def test_encoding_and_decoding_lose_less_than_half_a_step() -> None:
 
 def test_samples_are_averaged_in_linear_light() -> None:
     black_and_white = encode(np.indices((4, 4)).sum(axis=0)[..., None] % 2 * np.ones(3))
-    pixels = develop(black_and_white, 2, 1.0)
+    pixels = develop(average(black_and_white, 2), 1.0)
     assert pixels.shape == (2, 2, 3)
     assert np.abs(pixels.astype(int) - round(255 * float(to_srgb(np.array(0.5))))).max() <= 1
 
@@ -84,7 +82,7 @@ def test_developing_follows_its_formula_in_numpy() -> None:
     for per_side in (1, 2, 3):
         blocks = DECODED[samples].reshape(12 // per_side, per_side, 18 // per_side, per_side, 3)
         wanted = 255 * to_srgb(roll_off(np.minimum(1.25 * blocks.mean(axis=(1, 3), dtype=np.float64), WHITE)))
-        error = np.abs(develop(samples, per_side, 1.25) - wanted).max()
+        error = np.abs(develop(average(samples, per_side), 1.25) - wanted).max()
         print(f"{per_side} x {per_side} samples: largest error {error:.3f} of a byte")
         assert error < 0.52
 

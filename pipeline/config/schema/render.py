@@ -29,9 +29,9 @@ class Render(Section):
     size: tuple[Annotated[int, Field(ge=16, le=16384)], Annotated[int, Field(ge=16, le=16384)]] = (1280, 720)
     """Width and height of a frame [px]."""
     samples: Annotated[int, Field(ge=1, le=8)] = 2
-    """N for N x N supersampling."""
-    geometry: Literal["auto", "tubes", "ribbons", "lines"] = "auto"
-    """How strands are drawn; "auto" decides by projected width and prints its choice."""
+    """N for N x N supersampling of what VTK draws: the head, and all strands but those of geometry "coverage"."""
+    geometry: Literal["auto", "coverage", "tubes", "ribbons", "lines"] = "auto"
+    """How strands are drawn: "coverage" is exact for any width and the fastest, "lines" are one sample wide; "auto" is coverage, and tubes from 3 px of width on, and prints its choice."""
     width: Annotated[Length, Field(gt=0)] | None = None
     """Drawn width (diameter) of a strand; unset, a fibre's, widened to keep the coverage of 100,000 strands when there are fewer."""
     taper: Fraction = 0.15

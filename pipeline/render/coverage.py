@@ -1,0 +1,75 @@
+"""Strands by exact coverage over what VTK has drawn; see `pipeline.kernels.Raster`.
+
+All strands of a frame are counted first, beside their light, so that hair that nobody can see is neither shaded nor
+drawn. Then `draw` takes them once more, and again for the few tiles where the guess of what can be seen was wrong.
+"""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import kernels
+from pipeline.config.schema import Camera
+from pipeline.render.geometry import smooth
+from pipeline.render.target import DECODED, Target
+
+Points = NDArray[np.float32]
+Which = NDArray[np.uint32]
+Chunks = Callable[[], Iterable[tuple[int, Points]]]
+"""All strands in chunks: the number of the first, and their points (S, P, 3) [m]; the same each time."""
+Shade = Callable[[int, Points, Which], NDArray[np.float32]]
+"""Linear RGB (n, 3) of some of the points (n,), flat indices, of a chunk."""
+
+_LAYERS, _LAYERS_PER_PIXEL = (
+    8.0,
+    25.0,
+)  # of hair that hide the rest, for the thinnest strands, and more for wider ones
+_LAYERS_MOST = 33.0
+
+
+class Coverage:
+    """One frame: `count` all strands, then `draw` them over the target."""
+
+    def __init__(self, target: Target, size: tuple[int, int], camera: Camera, pixels: float) -> None:
+        """Start a frame of `size` [px] with strands about `pixels` wide; the target has been cleared for it."""
+        self._target, self._size = target, size
+        scale = size[1] / 2 / np.tan(camera.field_of_view / 2)
+        layers = min(_LAYERS + _LAYERS_PER_PIXEL * pixels, _LAYERS_MOST)
+        self._raster = kernels.Raster(size, target.matrix(), scale, target.planes(), layers)
+
+    def count(self, first: int, points: Points, widths: Points) -> None:
+        """Look at strands (S, P, 3) [m] with widths (S, P) [m], which begin with number `first`."""
+        self._raster.count(points, widths, first)
+
+    def draw(self, chunks: Chunks, widths: Callable[[Points], Points], pieces: int, shade: Shade) -> Points:
+        """Linear RGB (H, W, 3) of all strands, with `pieces` drawn segments per segment, over what the target shows."""
+        across, down = self._size
+        samples, depth = np.ascontiguousarray(self._target.read()), self._target.depth()
+        backdrop = kernels.Backdrop(depth, samples, DECODED, self._target.width // across)
+        self._raster.cut_off(backdrop)
+        picture = np.empty((down, across, 3), np.float32)
+        wrong = 1
+        while wrong:
+            for first, points in chunks():
+                fine = smooth(points, pieces) if pieces > 1 else points
+                seen = self._raster.add(fine, widths(fine))
+                self._raster.colour(_colours(shade, first, points, pieces, seen))
+            wrong = self._raster.compose(backdrop, picture)
+        return picture
+
+
+def _colours(shade: Shade, first: int, points: Points, pieces: int, seen: Which) -> Points:
+    """Linear RGB (n, 3) of points of the subdivided strands, linear between the points that are shaded."""
+    if pieces == 1:
+        return shade(first, points, seen)
+    count = points.shape[1]
+    strand, place = np.divmod(seen, np.uint32((count - 1) * pieces + 1))
+    segment, part = np.divmod(place, np.uint32(pieces))
+    before = strand * np.uint32(count) + segment
+    after = before + (part > 0)
+    shaded = np.unique(np.concatenate([before, after]))
+    colours = shade(first, points, shaded)
+    a, b = (colours[np.searchsorted(shaded, ends)] for ends in (before, after))
+    t = part.astype(np.float32)[:, None] / np.float32(pieces)
+    return np.asarray(a + t * (b - a))
