@@ -31,11 +31,11 @@ class Swatch(Section):
 
 class Groom(Section):
     source: str = "procedural"
-    """"procedural", "swatch" (strands on a patch, no head) or the path of a .tfx, .hair or .data file, relative to the config."""
-    unit_scale: Annotated[float, Field(gt=0)] = 1.0
-    """Metres per unit of the groom file."""
-    up_axis: Literal["x", "y", "z"] = "y"
-    """Which axis of the groom file points up."""
+    """"procedural", "swatch" (strands on a patch, no head) or the path of a groom file, relative to the config: .tfx, .hair, .data, .usd (.usda, .usdc, .usdz), .vtp, .vtkhdf or .abc."""
+    unit_scale: Annotated[float, Field(gt=0)] | None = None
+    """Metres per unit of the groom file; unset, what the file says (only USD does), else 1."""
+    up_axis: Literal["x", "y", "z"] | None = None
+    """Which axis of the groom file points up; unset, what the file says (only USD does), else y."""
     pins: str | None = None
     """A file of held points, relative to the config: a row a strand of .csv or .npy, either two numbers (held at root and tip; 1 is a hinge, 2 a clamp) or one a point (0 free, 1 by the head, 2 by the hand)."""
     strands: Annotated[int, Field(ge=1, le=10_000_000)] = 60_000
