@@ -32,6 +32,7 @@ static DistanceField make_field(Array<const float, -1, -1, -1> values, Array<con
     require(std::all_of(field.values.begin(), field.values.end(), [](float v) { return std::isfinite(v); }),
             "DistanceField: a value is not finite");
     field.measure_slope();
+    field.measure_bricks();
     return field;
 }
 
