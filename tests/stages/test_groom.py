@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline import cache
-from pipeline.config.schema import Config, Contact, Curl, Groom, Parting, Scene, Simulate, Swatch
+from pipeline.config.schema import Config, Contact, Curl, Groom, Parting, Scene, Swatch
 from pipeline.groom import stage
 from pipeline.groom.head.distance import distance
 from pipeline.groom.heads import Head
@@ -219,7 +219,7 @@ def test_the_stage_writes_the_same_bytes_again(
 
 def test_guides_keep_most_of_their_groomed_distance_up_to_the_layer(mannequin: Head, wavy: Strands) -> None:
     contact, points = Contact(offset=0.001, layer=0.02), wavy.points[:300]
-    offset = stage.contact_offset(Config(name="o", simulate=Simulate(contact=contact)), mannequin, points)
+    offset = stage.contact_offset(contact, mannequin.field, points)
     groomed = mannequin.field.distance(points.reshape(-1, 3)).reshape(300, -1)
     above = (offset - np.maximum(groomed, contact.offset)).max()
     steps = np.abs(np.diff(offset[:, 1:], axis=1)).max(axis=1) / wavy.spacing[:300]
