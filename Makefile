@@ -80,7 +80,7 @@ sheet: render ## the frames of CONFIG on one page
 
 # --- Checks --------------------------------------------------------------------------------------
 
-.PHONY: test lint validate images approve bench sanitize schema
+.PHONY: test lint validate interpolation images approve bench sanitize schema
 test: env ## all tests
 	$(BIN)/pytest -n 2 --dist loadfile
 
@@ -92,6 +92,9 @@ lint: env ## style, types, and who may import whom
 
 validate: env ## the physics against closed forms and rod equations; writes docs/validation.md
 	$(RINGLET) validate --page docs/validation.md
+
+interpolation: env ## strands that follow guides against their own simulation; writes docs/interpolation.md
+	$(RINGLET) bench interpolation-error --page docs/interpolation.md
 
 images: env ## golden images; differences go to an HTML page
 	$(BIN)/pytest tests/images

@@ -32,7 +32,7 @@ Settings = Annotated[
         negative="",
         show_default=False,
         allow_leading_hyphen=True,
-        help='Override a value, as in -s "groom.cut.length=20 cm"; may be repeated.',
+        help='Override a value, as in -s "groom.style.waves.radius=9 mm"; may be repeated.',
     ),
 ]
 Outputs = Annotated[Path, Parameter(help="Folder that holds a folder for each experiment.")]

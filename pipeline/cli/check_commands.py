@@ -122,6 +122,43 @@ def bench_interpolate(*, strands: Count = 1_000_000, points: Count = 32, json: J
     _report(bench(strands=strands, points=points), json)
 
 
+@bench.command(name="interpolation-error")
+def bench_interpolation_error(
+    *,
+    quick: Annotated[bool, Flag, Parameter(help="Two kinds of hair, few strands: seconds.")] = False,
+    page: Annotated[Path | None, Parameter(help="Write a Markdown page with tables and pictures.")] = None,
+    plots: Annotated[Path | None, Parameter(help="Draw pictures into this folder.")] = None,
+    json: Json = False,
+) -> None:
+    """How far strands that follow guides are from where their own simulation takes them, by method and guides."""
+    from pipeline.progress import track
+    from pipeline.validation.interpolation import FULL, QUICK, measure, merged
+    from pipeline.validation.interpolation.page import write_page
+    from pipeline.validation.interpolation.plots import draw
+    from pipeline.validation.plots import need_matplotlib
+
+    if page or plots:
+        need_matplotlib("ringlet bench interpolation-error")
+    plan, parts = QUICK if quick else FULL, []
+    with track("interpolation", 2 * len(plan.kinds), "scene") as bar:
+        for part in measure(plan):
+            parts.append(part)
+            bar.advance()
+    report = merged(plan, parts)
+    if json:
+        print_json(report.as_json())
+    else:
+        rows = [row.as_json() for row in report.rows]
+        _table(rows, tuple(rows[0]))
+        print()
+        floors = report.as_json()["floors"]
+        _table(floors, tuple(floors[0]))
+    if plots:
+        draw(report, plots)
+    if page:
+        write_page(report, page, quick)
+
+
 @bench.command(name="render")
 def bench_render(
     *,

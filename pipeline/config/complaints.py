@@ -4,12 +4,14 @@ import difflib
 import json
 import types
 import typing
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from pipeline.config.schema import Config
+from pipeline.config.schema.style import OPERATORS
 from pipeline.config.tree import KeyPath, Tree
 
 _PHRASES = {
@@ -30,10 +32,15 @@ def complaints(error: ValidationError, tree: Tree, path: Path) -> list[str]:
 
 def _complaint(detail: dict[str, Any], tree: Tree, path: Path) -> tuple[tuple[str, int], str]:
     kind: str = detail["type"]
-    key = detail["loc"] if kind == "missing" else _written(detail["loc"], tree)
+    loc = _untagged(detail["loc"])
+    key = loc if kind == "missing" else _written(loc, tree)
+    if kind == "union_tag_invalid" and isinstance(tree.get(key), dict):
+        return _complaint(_operator(key, tree), tree, path)
     where = tree.where(key) or str(path)
     if kind == "extra_forbidden":
-        what = f"unknown key{_did_you_mean(key)}"
+        what = f"unknown key{_did_you_mean(key, tree)}"
+    elif kind == "union_tag_invalid":
+        what = f"expected a table, got {_shown(tree.get(key))}"
     elif kind == "missing":
         what = "has to be set"
     else:
@@ -41,6 +48,21 @@ def _complaint(detail: dict[str, Any], tree: Tree, path: Path) -> tuple[tuple[st
     file, _, line = where.rpartition(":")
     order = (file, int(line)) if line.isdigit() else (where, 0)
     return order, f"{tree.label(key) if key else path}: {what}"
+
+
+def _untagged(loc: KeyPath) -> KeyPath:
+    """Leave out the tags of tagged unions, which the schema writes in brackets."""
+    return tuple(part for part in loc if not str(part).startswith("("))
+
+
+def _operator(key: KeyPath, tree: Tree) -> dict[str, Any]:
+    """The complaint about a style operator that does not say which one it is."""
+    named, known = tree.get((*key, "op")), ", ".join(OPERATORS)
+    if named is None:
+        return {"type": "style", "loc": key, "msg": f"op has to be set to one of {known}"}
+    close = difflib.get_close_matches(str(named), OPERATORS, 1)
+    remedy = f"did you mean {close[0]!r}?" if close else f"there are {known}"
+    return {"type": "style", "loc": (*key, "op"), "msg": f"unknown operator; {remedy}"}
 
 
 def _written(loc: KeyPath, tree: Tree) -> KeyPath:
@@ -64,43 +86,61 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _did_you_mean(key: KeyPath) -> str:
+def _did_you_mean(key: KeyPath, tree: Tree) -> str:
     """Look among the neighbours first, then for the same name in another table."""
-    name, table = str(key[-1]), _model(key[:-1])
-    if table is not None and (close := difflib.get_close_matches(name, table.model_fields, 1)):
+    name, table = str(key[-1]), _model(key[:-1], tree)
+    if table is not None and (close := difflib.get_close_matches(name, _names(table), 1)):
         return f"; did you mean {close[0]!r}?"
     everywhere = _keys(Config, "")
     elsewhere = [other for other in everywhere if other.rpartition(".")[2] == name]
     if elsewhere:
         return f"; did you mean {elsewhere[0]!r}?"
-    listed = ", ".join(table.model_fields) if table else ""
+    listed = ", ".join(_names(table)) if table else ""
     return f"; this table has {listed}" if listed else ""
 
 
-def _model(path: KeyPath) -> type[BaseModel] | None:
-    model: type[BaseModel] = Config
-    for part in path:
+def _model(path: KeyPath, tree: Tree) -> type[BaseModel] | None:
+    """The table of options at a path; which one a style operator is, its value tells."""
+    annotation: Any = Config
+    for depth, part in enumerate(path):
         if isinstance(part, int):
             continue
-        field = model.model_fields.get(part)
-        inner = _section(field.annotation) if field else None
-        if inner is None:
-            return None
-        model = inner
-    return model
+        if typing.get_origin(annotation) is dict:  # of tables with names of their own
+            annotation = typing.get_args(annotation)[1]
+            continue
+        model = _chosen(annotation, tree.get(path[:depth]))
+        fields = model.model_fields if model else {}
+        annotation = next((f.annotation for name, f in fields.items() if (f.alias or name) == part), None)
+    return None if typing.get_origin(annotation) is dict else _chosen(annotation, tree.get(path))
 
 
-def _section(annotation: Any) -> type[BaseModel] | None:
-    """Find the table behind `Section`, `tuple[Section, ...]` or `Section | None`."""
+def _chosen(annotation: Any, value: Any) -> type[BaseModel] | None:
+    sections = list(_sections(annotation))
+    named = OPERATORS.get(str(value.get("op"))) if isinstance(value, dict) else None
+    return named if named in sections else next(iter(sections), None)
+
+
+def _names(model: type[BaseModel]) -> list[str]:
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Find the tables behind `Section`, `tuple[Section, ...]`, `Section | None` and the like."""
     if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
-        return annotation if issubclass(annotation, BaseModel) else None
-    found = (_section(argument) for argument in typing.get_args(annotation))
-    return next((section for section in found if section), None)
+        if issubclass(annotation, BaseModel):
+            yield annotation
+        return
+    for argument in typing.get_args(annotation):
+        yield from _sections(argument)
 
 
 def _keys(model: type[BaseModel], prefix: str) -> list[str]:
-    names: list[str] = []
+    keys: list[str] = []
     for name, field in model.model_fields.items():
-        inner = _section(field.annotation)
-        names += [f"{prefix}{name}"] + (_keys(inner, f"{prefix}{name}.") if inner else [])
-    return names
+        key = f"{prefix}{field.alias or name}"
+        own = ".NAME" if typing.get_origin(field.annotation) is dict else ""
+        keys += [
+            key,
+            *(inner for section in _sections(field.annotation) for inner in _keys(section, f"{key}{own}.")),
+        ]
+    return keys

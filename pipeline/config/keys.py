@@ -63,6 +63,7 @@ def stage_inputs(config: Config) -> dict[str, Inputs]:
     for key, paths in named_files(config).items():
         _stand_in(values, key, paths)
     flat = _flat(values, ())
+    flat["groom.style"] = list(values["groom"]["style"])  # operators do not commute
     stages: dict[str, Inputs] = {}
     for stage in STAGES:
         inputs: Inputs = {key: value for key, value in flat.items() if _reads(stage, key)}

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,13 @@ from pipeline.config.toml_lines import key_lines
 from pipeline.config.tree import KeyPath, Tree, dotted, parse_key
 from pipeline.errors import InputError
 
-FILES: dict[tuple[str, ...], tuple[str, ...]] = {  # keys that name a file, and the words that do not
+FILES: dict[
+    tuple[str, ...], tuple[str, ...]
+] = {  # keys that name a file ("*" is any), and the words that do not
     ("scene", "head"): ("builtin", "none"),
     ("groom", "source"): ("procedural", "swatch"),
     ("groom", "pins"): (),
+    ("groom", "style", "*", "*", "map"): (),
     ("simulate", "motion", "file"): (),
     ("simulate", "tips_file"): (),
 }
@@ -48,8 +52,10 @@ def load(path: Path, overrides: tuple[str, ...] = ()) -> Loaded:
     tree = _read(path, files)
     for override in overrides:
         _override(tree, override)
-    missing = [message for key, words in FILES.items() if (message := _resolve(tree, key, words))]
-    missing += [message for key in SEQUENCES if (message := _resolve_sequence(tree, key))]
+    missing = [message for key in _naming(tree.values, FILES) if (message := _resolve(tree, key))]
+    missing += [
+        message for key in _naming(tree.values, SEQUENCES) if (message := _resolve_sequence(tree, key))
+    ]
     try:
         config = Config.model_validate_json(json.dumps(tree.values, default=str), strict=True)
     except ValidationError as error:
@@ -62,14 +68,32 @@ def load(path: Path, overrides: tuple[str, ...] = ()) -> Loaded:
 
 def named_files(config: Config) -> dict[tuple[str, ...], tuple[Path, ...]]:
     """The files that a config names, by key. Raises InputError for a sequence with gaps."""
-    found: dict[tuple[str, ...], tuple[Path, ...]] = {}
-    for key in (*FILES, *SEQUENCES):
-        value: Any = config
-        for name in key:
-            value = getattr(value, name)
-        if value is not None and value not in FILES.get(key, ()):
-            found[key] = numbered_files(Path(value)) if key in SEQUENCES else (Path(value),)
-    return found
+    values = config.model_dump(mode="json")
+    files = {key: (Path(value),) for key, value in _naming(values, FILES).items() if value not in _words(key)}
+    sequences = {key: numbered_files(Path(value)) for key, value in _naming(values, SEQUENCES).items()}
+    return files | sequences
+
+
+def _naming(values: dict[str, Any], patterns: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
+    """The keys of a tree that match one of the patterns, with their strings."""
+    found: dict[tuple[str, ...], Any] = {}
+    for pattern in patterns:
+        level: dict[tuple[str, ...], Any] = {(): values}
+        for part in pattern:
+            level = {
+                (*key, name): inner
+                for key, table in level.items()
+                if isinstance(table, dict)
+                for name, inner in table.items()
+                if part in ("*", name)
+            }
+        found |= level
+    return {key: value for key, value in found.items() if isinstance(value, str)}
+
+
+def _words(key: KeyPath) -> tuple[str, ...]:
+    """What a key that can name a file may say instead."""
+    return FILES.get(tuple(map(str, key)), ())
 
 
 def _read(path: Path, files: list[Path]) -> Tree:
@@ -85,7 +109,7 @@ def _read(path: Path, files: list[Path]) -> Tree:
     lines = {key: f"{path}:{line}" for key, line in key_lines(text).items()}
     values.setdefault("name", path.stem)
     own = Tree(values, lines)
-    own.anchor = dict.fromkeys((*FILES, *SEQUENCES), path.parent)
+    own.anchor = dict.fromkeys(_naming(values, (*FILES, *SEQUENCES)), path.parent)
     parent = values.pop("extends", None)
     if parent is None:
         return own
@@ -124,14 +148,15 @@ def _syntax(path: Path, text: str, message: str) -> str:
 def _override(tree: Tree, override: str) -> None:
     key, equals, value = override.partition("=")
     if not equals or not key.strip():
-        raise InputError(f'-s {override}: expected key=value, such as -s "groom.cut.length=20 cm"')
+        raise InputError(f'-s {override}: expected key=value, such as -s "groom.style.waves.radius=9 mm"')
     path = parse_key(key.strip())
     try:
         tree.set(path, _scalar(value.strip()), f"-s {dotted(path)}", _defaults)
     except LookupError as error:
         raise InputError(f"-s {key.strip()}: {error.args[0]}") from None
-    if path in FILES or path in SEQUENCES:
-        tree.anchor[path] = Path.cwd()
+    tree.anchor |= dict.fromkeys(
+        (key for key in _naming(tree.values, (*FILES, *SEQUENCES)) if key[: len(path)] == path), Path.cwd()
+    )
 
 
 def _scalar(value: str) -> Any:
@@ -150,10 +175,10 @@ def _defaults(path: KeyPath) -> Any:
     return value
 
 
-def _resolve(tree: Tree, key: KeyPath, words: tuple[str, ...]) -> str | None:
+def _resolve(tree: Tree, key: KeyPath) -> str | None:
     """Make a file's path absolute, relative to the config that names it; return what is wrong with it."""
-    value = tree.get(key)
-    if not isinstance(value, str) or value in words:
+    value, words = tree.get(key), _words(key)
+    if value in words:
         return None
     file = (tree.anchor[key] / Path(value).expanduser()).resolve()
     tree.replace(key, str(file))
@@ -167,8 +192,6 @@ def _resolve(tree: Tree, key: KeyPath, words: tuple[str, ...]) -> str | None:
 def _resolve_sequence(tree: Tree, key: KeyPath) -> str | None:
     """Make the pattern of a sequence absolute; return what is wrong with its files."""
     value = tree.get(key)
-    if not isinstance(value, str):
-        return None
     pattern = tree.anchor[key].resolve() / Path(value).expanduser()
     tree.replace(key, str(pattern))
     try:

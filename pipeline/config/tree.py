@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pipeline.config.schema.varying import KINDS
+
 KeyPath = tuple[str | int, ...]
 
 
@@ -38,7 +40,11 @@ class Tree:
         return where if where == f"-s {name}" else ": ".join(part for part in (where, name) if part)
 
     def update(self, other: "Tree") -> None:
-        """Lay another tree over this one: tables merge, everything else is replaced whole."""
+        """Lay another tree over this one: tables of one kind merge, everything else is replaced whole.
+
+        A table's kind is its `op`, and which of `KINDS` it has: an operator that becomes another one keeps its name
+        and its place, but none of its options.
+        """
         self._merge(self.values, other.values, ())
         self.origins |= other.origins
         for path, folder in other.anchor.items():
@@ -47,7 +53,7 @@ class Tree:
 
     def _merge(self, mine: dict[str, Any], theirs: dict[str, Any], path: KeyPath) -> None:
         for name, value in theirs.items():
-            if isinstance(value, dict) and isinstance(mine.get(name), dict):
+            if isinstance(value, dict) and isinstance(mine.get(name), dict) and _alike(mine[name], value):
                 self._merge(mine[name], value, (*path, name))
             else:
                 self._forget((*path, name))
@@ -83,6 +89,14 @@ class Tree:
             inside[path[-1]] = value
         self._forget(path)
         self.origins[path] = origin
+
+
+def _alike(mine: dict[str, Any], theirs: dict[str, Any]) -> bool:
+    """Whether a table only changes values of another one, and does not put another kind of thing in its place."""
+    if "op" in theirs and theirs["op"] != mine.get("op", theirs["op"]):
+        return False
+    kinds = [{name for name in KINDS if name in table} for table in (mine, theirs)]
+    return not kinds[1] or not kinds[0] or kinds[0] == kinds[1]
 
 
 def _element(inside: Any, path: KeyPath, depth: int) -> Any:

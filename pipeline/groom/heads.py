@@ -4,13 +4,15 @@ A mesh's skull is fitted to the mannequin's by crown, breadth and depth (one sca
 hairline, parting and cut heights then hold on it. Grooming happens in these fitted coordinates.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from dataclasses import field as default
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from pipeline.body.normals import point_normals
 from pipeline.config.schema import Config
@@ -55,6 +57,8 @@ class Head:
     """World position of the fitted origin [m]."""
     project: Feet
     """Pulls points (N, 3) near the skin onto it and tells the normals there; fitted coordinates."""
+    arrays: Mapping[str, NDArray[np.float32]] = default(default_factory=dict)
+    """Painted numbers (V,) on the points of the skin, by name."""
 
     @property
     def fitted_field(self) -> Field:
@@ -64,6 +68,22 @@ class Head:
     def density(self, p: Points) -> Points:
         """Relative density of roots at fitted points on the skin."""
         return scalp.density(p)
+
+    def uv(self, p: Points) -> Points:
+        """Texture coordinates (N, 2), 0 to 1, of fitted points on the skin: the scalp chart."""
+        return np.asarray(0.5 + 0.5 * scalp.to_chart(p))
+
+    def array(self, name: str, p: Points) -> NDArray[np.float64]:
+        """A painted array at fitted points (N, 3), blended from the three nearest points of the skin.
+
+        Raises InputError for an array that the mesh does not have.
+        """
+        if name not in self.arrays:
+            there = f"it has {', '.join(self.arrays)}" if self.arrays else "it has none"
+            raise InputError(f'scene.head: no painted array "{name}" on this mesh; {there}')
+        apart, near = cKDTree(self.skin.points).query(self.to_world(p), k=3)
+        weight = 1 / np.maximum(apart, 1e-9)
+        return np.asarray((self.arrays[name][near] * weight).sum(axis=1) / weight.sum(axis=1), np.float64)
 
     def to_world(self, p: Points) -> Points:
         """Fitted coordinates to world coordinates."""

@@ -37,8 +37,8 @@ def load(config: Config, head: Head | None) -> tuple[Strands, dict[str, Any]]:
     groom, path = config.groom, Path(config.groom.source)
     file = read_groom(path)
     repairs = Repairs()
-    upright_points = upright(file.points * groom.unit_scale, groom.up_axis)
-    kept, index = cleaned(Ragged(upright_points, file.counts, file.pins), repairs)
+    metric = in_metres(file, groom.unit_scale, groom.up_axis)
+    kept, index = cleaned(metric, repairs)
     if not len(kept):
         raise InputError(
             f"{path}: none of its {len(file)} strands has a length from {1e3 * SHORTEST:g} mm to {LONGEST:g} m; "
@@ -51,11 +51,29 @@ def load(config: Config, head: Head | None) -> tuple[Strands, dict[str, Any]]:
     for line in repairs.lines():
         say("groom", f"{path.name}: {line}")
     order = progressive_order(points[:, 0], config.seed)[: groom.strands]
-    report = {"source": path.name, "file_strands": len(file), "repairs": vars(repairs)}
+    wide = width(metric)
+    report = {"source": path.name, "file_strands": len(file), "repairs": vars(repairs), "width": wide}
+    if wide is not None:
+        say("groom", f"{path.name}: its strands are {1e6 * wide:.3g} um wide; what is drawn is render.width")
     held = held_ends(pins, groom.points)
     if groom.pins is not None:
         held = read_held(Path(groom.pins), len(file), groom.points)[index]
     return _strands(config, points[order], held[order], head), report
+
+
+def in_metres(file: Ragged, unit_scale: float | None, up_axis: str | None) -> Ragged:
+    """The strands of a file in metres with y up: as told, else as the file says, else in metres and upright already."""
+    scale = unit_scale or file.metres or 1.0
+    points = upright(file.points * scale, up_axis or file.up_axis or "y")
+    widths = None if file.widths is None else file.widths * np.float32(scale)
+    return Ragged(points, file.counts, file.pins, widths)
+
+
+def width(strands: Ragged) -> float | None:
+    """Median of the diameters [m] of a file; strands of the pipeline have one width, `render.width`, and a taper."""
+    if strands.widths is None or not np.isfinite(strands.widths).any():
+        return None
+    return float(np.nanmedian(strands.widths))
 
 
 def evenly_spaced(strands: Ragged, count: int) -> tuple[Vectors, Pins]:

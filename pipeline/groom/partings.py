@@ -45,14 +45,15 @@ class PartingLine:
 
     def crowding(self, p: Points) -> NDArray[np.float64]:
         """Density of roots, 1 but for more beside the parting: hair flows away from it, and none lies over it."""
-        return np.asarray(1 + _CROWDING * (1 - smoothstep(self._distance(p) / _CROWDED)))
+        return np.asarray(1 + _CROWDING * (1 - smoothstep(self.distance(p) / _CROWDED)))
 
     def swirl(self, p: Points) -> NDArray[np.float64]:
         """Angle [rad] by which the flow turns about the parting's end on the crown: hair crosses there and covers it."""
         to_end = np.hypot(p[:, 0] - self._x(np.array([_BACK])), p[:, 2] - _BACK)
         return np.asarray(_SWIRL * np.exp(-((to_end / _SWIRLED) ** 2)))
 
-    def _distance(self, p: Points) -> NDArray[np.float64]:
+    def distance(self, p: Points) -> NDArray[np.float64]:
+        """Distance (N,) [m] of points (N, 3) from the parting, seen from above."""
         z = np.clip(p[:, 2], _BACK, _FRONT)
         return np.asarray(np.hypot(p[:, 0] - self._x(z), p[:, 2] - z))
 

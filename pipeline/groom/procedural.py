@@ -1,4 +1,4 @@
-"""Procedural hair: roots -> paths -> cut -> clumps -> curls -> frizz -> equal spacing, chunk by chunk.
+"""Procedural hair: roots, bristles, the style's operators, equal spacing; chunk by chunk.
 
 A strand depends on the seed, its index and the middles of its clumps alone; the middles are the first strands of
 the progressive order and are made first. So any chunking gives the same strands, and memory does not grow.
@@ -14,25 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Config
-from pipeline.groom.curls import curled, frizzed
 from pipeline.groom.heads import Head
-from pipeline.groom.locks import Bundle, Locks
 from pipeline.groom.partings import PartingLine
-from pipeline.groom.paths import STEP, Terrain, cut_lengths, grow, traits
 from pipeline.groom.repairs import pushed_out
 from pipeline.groom.roots import place_roots
+from pipeline.groom.style.ground import Ground, Terrain, tangential
+from pipeline.groom.style.hair import LONGEST, Hair, bristles, unit
+from pipeline.groom.style.stack import CHUNK, Stack
 from pipeline.strands.held import held_ends
-from pipeline.strands.random import hashed, uniform
+from pipeline.strands.random import hashed
 from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
 
 Vectors = NDArray[np.float64]
 
-CHUNK = 8192
 _WORKERS = 2
 _CLEARANCE = 0.8e-3  # [m] between strands and skin
-_FLYAWAY_CLUMPING = 0.15
-_KEY, _UNEVEN = 7, 63  # salts
+_KEY = 7  # salt
 
 
 class Style:
@@ -47,10 +45,8 @@ class Style:
         found, _ = place_roots(self.groom.strands, self.seed, skin, density)
         self.roots, self.normals = (np.asarray(a, np.float64) for a in head.project(found))
         self.side = self.terrain.side(self.roots)
-        self.big = Locks(self.groom.big_clumps, self.roots, self.side, salt=70)
-        self.small = Locks(self.groom.small_clumps, self.roots, self.side, salt=71)
-        self._big_middles = self._smooth(np.arange(self.big.count))
-        self._small_middles = self._in_locks(np.arange(self.small.count))
+        ground = Ground(self.seed, self.groom.points, self.terrain, head)
+        self.stack = Stack(self.groom.style, ground, self._bristles, self.roots, self.side)
 
     def chunks(self) -> Iterator[Strands]:
         """All strands, in order; a few chunks are made at once, and no more are kept."""
@@ -65,56 +61,28 @@ class Style:
     def strands(self, first: int, count: int = CHUNK) -> Strands:
         """Up to `count` strands from `first` on, in world coordinates."""
         index = np.arange(first, min(first + count, len(self.roots)))
-        roots, side = self.roots[index], self.side[index]
-        own = traits(self.groom, self.seed, index)
-        keep = np.where(own.flyaway, _FLYAWAY_CLUMPING, 1.0)
-        bundle, comb = self._combed(index)
-        small = self.small.of(roots, side)
-        points = self.small.gather(bundle, self._small_middles, small, keep, self.seed, index)
-        along = np.linspace(0, 1, self.groom.points) * bundle.length[:, None]
-        lock = small if self.groom.curl.shared_by == "small" else self.big.of(roots, side)
-        points = curled(self.groom.curl, self.seed, index, lock, points, along, comb)
-        points = frizzed(self.groom.frizz, self.seed, index, own.flyaway, points, along)
-        points[:, 0] = roots
+        points = self.stack.strands(index).points
+        points[:, 0] = self.roots[index]
         points = self._evened(points)
         return Strands(
             points=self.head.to_world(points).astype(np.float32),
             held=held_ends(np.tile([2, 0], (len(index), 1)), self.groom.points),
             normal=self.normals[index].astype(np.float32),
-            side=side,
+            side=self.side[index],
             key=hashed(self.seed, index, _KEY),
         )
 
-    def _smooth(self, index: NDArray[np.int64]) -> Bundle:
-        return self._grown(index)[0]
-
-    def _in_locks(self, index: NDArray[np.int64]) -> Bundle:
-        parts = [self._combed(part)[0] for part in np.array_split(index, max(len(index) // CHUNK, 1))]
-        return Bundle(
-            np.concatenate([part.points for part in parts]), np.concatenate([part.length for part in parts])
+    def _bristles(self, index: NDArray[np.int64]) -> Hair:
+        root, normal = self.roots[index], self.normals[index]
+        return Hair(
+            index=index,
+            root=root,
+            normal=normal,
+            side=self.side[index],
+            points=bristles(root, normal),
+            length=np.full(len(index), LONGEST),
+            comb=unit(tangential(np.broadcast_to([0.0, -1.0, 0.0], root.shape), normal)),
         )
-
-    def _combed(self, index: NDArray[np.int64]) -> tuple[Bundle, Vectors]:
-        """Strands gathered in the big clumps, and their comb directions."""
-        bundle, comb = self._grown(index)
-        own = traits(self.groom, self.seed, index)
-        keep = np.where(own.flyaway, _FLYAWAY_CLUMPING, 1.0)
-        lock = self.big.of(self.roots[index], self.side[index])
-        points = self.big.gather(bundle, self._big_middles, lock, keep, self.seed, index)
-        return Bundle(points, bundle.length), comb
-
-    def _grown(self, index: NDArray[np.int64]) -> tuple[Bundle, Vectors]:
-        if len(index) == 0:
-            return Bundle(np.zeros((0, self.groom.points, 3)), np.zeros(0)), np.zeros((0, 3))
-        paths = grow(self.groom, self.seed, index, self.roots[index], self.normals[index], self.terrain)
-        lock = self.big.of(self.roots[index], self.side[index])
-        uneven = self.groom.cut.uneven * (2 * uniform(self.seed, lock, _UNEVEN) - 1)
-        length = cut_lengths(self.groom, self.seed, index, paths, uneven)
-        place = np.linspace(0, 1, self.groom.points) * length[:, None] / STEP
-        i = np.minimum(place.astype(np.int64), paths.points.shape[1] - 2)
-        u = (place - i)[..., None]
-        row = np.arange(len(index))[:, None]
-        return Bundle(paths.points[row, i] * (1 - u) + paths.points[row, i + 1] * u, length), paths.comb
 
     def _evened(self, points: Vectors) -> Vectors:
         """Points at equal spacing, none of them below the skin."""

@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 
 from pipeline import cache
 from pipeline.config import Config, provenance
+from pipeline.config.schema import Contact
 from pipeline.groom.body import BodyFrame, body_frames
 from pipeline.groom.guides import choose_guides, looked_at
+from pipeline.groom.head_field import Field
 from pipeline.groom.heads import Head, make_head
 from pipeline.groom.procedural import Style
 from pipeline.groom.swatch import swatch
@@ -42,22 +44,24 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
         points, side = _write_strands(writer, chunks, count, looked_at(config.groom.guides))
         chosen = choose_guides(points, side, config.groom.guides)
         writer.write("guides/strand", chosen)
-        writer.write("guides/offset", contact_offset(config, head, points[chosen]))
+        writer.write(
+            "guides/offset",
+            contact_offset(config.simulate.contact, head.field if head else None, points[chosen]),
+        )
         writer.meta["report"] = {"strands": count, "guides": len(chosen)} | report
     say("groom", f"{count} strands, {len(chosen)} guides")
 
 
-def contact_offset(config: Config, head: Head | None, guides: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Distance [m] that guide points (G, P, 3) keep from the skin, (G, P).
+def contact_offset(contact: Contact, field: Field | None, guides: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Distance [m] that guide points (G, P, 3) keep from the skin of distance `field`, (G, P).
 
     It is most of the groomed distance, up to `contact.layer`: the hair below holds a guide up. Points groomed below
     the skin are to come out of it to `contact.offset`. From point to point, and from the held root on, it changes at
     most half as fast as the strand is long: what cannot be reached without stretching has no solution.
     """
-    contact = config.simulate.contact
-    if head is None:
+    if field is None:
         return np.full(guides.shape[:2], contact.offset, np.float32)
-    groomed = head.field.distance(guides.reshape(-1, 3)).reshape(guides.shape[:2])
+    groomed = field.distance(guides.reshape(-1, 3)).reshape(guides.shape[:2])
     offset = np.clip(_HELD_UP * groomed, 0, max(contact.layer, contact.offset))
     offset = np.where(groomed > 0, offset, contact.offset)
     offset[:, :2] = groomed[:, :2]

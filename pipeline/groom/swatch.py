@@ -1,9 +1,12 @@
-"""A swatch: strands on a flat patch, straight or curled, without a head. For physics experiments and looks of fibres."""
+"""A swatch: strands on a flat patch, without a head. For physics experiments, looks of fibres and of style operators."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.config.schema import Config
-from pipeline.groom.curls import curled
+from pipeline.groom.style.ground import Ground
+from pipeline.groom.style.hair import Hair
+from pipeline.groom.style.stack import Stack
 from pipeline.strands.held import held_ends
 from pipeline.strands.random import hashed
 from pipeline.strands.resample import resampled
@@ -22,18 +25,29 @@ def swatch(config: Config) -> Strands:
     index = np.arange(groom.strands)
     uv = (0.5 + index[:, None] * np.array([1 / _PLASTIC, 1 / _PLASTIC**2])) % 1 - 0.5
     roots = groom.swatch.size * (uv[:, :1] * across + uv[:, 1:] * np.cross(direction, across))
-    along = np.linspace(0, groom.swatch.length, groom.points)
-    points = roots[:, None] + along[:, None] * direction
-    if groom.curl.radius > 0:
-        lengths = np.broadcast_to(along, points.shape[:2])
-        reference = np.broadcast_to(across, roots.shape)
-        points = curled(groom.curl, config.seed, index, index, points, lengths, reference)
-        points[:, 0] = roots
-        points = resampled(points, groom.points)
+    hair = Hair(
+        index=index,
+        root=roots,
+        normal=np.tile(direction, (len(index), 1)),
+        side=np.zeros(len(index), np.int8),
+        points=roots[:, None] + np.linspace(0, groom.swatch.length, groom.points)[:, None] * direction,
+        length=np.full(len(index), groom.swatch.length),
+        comb=np.tile(across, (len(index), 1)),
+    )
+    ground = Ground(config.seed, groom.points)
+    stack = Stack(groom.style, ground, lambda some: _some(hair, some), roots, hair.side)
+    points = stack.strands(index).points
+    points[:, 0] = roots
+    points = resampled(points, groom.points)
     return Strands(
         points=points.astype(np.float32),
         held=held_ends(np.tile([2, 2 if groom.swatch.pin_tips else 0], (len(index), 1)), groom.points),
-        normal=np.tile(direction, (len(index), 1)).astype(np.float32),
-        side=np.zeros(len(index), np.int8),
+        normal=hair.normal.astype(np.float32),
+        side=hair.side,
         key=hashed(config.seed, index, 7),
     )
+
+
+def _some(hair: Hair, index: NDArray[np.int64]) -> Hair:
+    names = ("index", "root", "normal", "side", "points", "length", "comb")
+    return Hair(**{name: getattr(hair, name)[index] for name in names})

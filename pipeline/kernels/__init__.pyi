@@ -798,3 +798,84 @@ class Raster:
         Returns how many tiles lack hair that was cut off too early. If there are any, `add` and `colour` all strands
         once more and compose again: only those tiles are drawn, with nothing cut off.
         """
+
+# --- groom: random numbers, equal spacing, growth, curls, clumps (random, smooth_curve, grow, coil, locks .hpp) -------
+#
+# Points (S, P, 3) float64 [m] are strands root first, at equal parts of their `length` (S,) [m] unless told otherwise;
+# every result is new, and that of a strand does not depend on the strands beside it. ValueError for other shapes.
+
+def hashed(index: NDArray[np.uint32], word: int) -> NDArray[np.uint32]:
+    """Hash (N,) each index (N,) with a word of 32 bits."""
+
+def normal(index: NDArray[np.uint32], word: int, second: int) -> _F64:
+    """Standard normal numbers (N,) of the hashes with two words (Box and Muller, 1958); to 1e-14."""
+
+def resampled(points: _F64, count: int) -> _F64:
+    """Points (S, count, 3) [m] at equal spacing along the natural cubic splines through strands (S, P, 3), P >= 2.
+
+    Root and tip stay. Segments of a strand agree to 1e-6 of their length, unless it turns back within one segment.
+    """
+
+def shortened(points: _F64, step: float, length: _F64, count: int) -> _F64:
+    """Points (S, count, 3) [m] at equal parts of the first `length` (S,) [m] of polylines (S, K, 3) of steps `step` [m]."""
+
+def coiled(points: _F64, reference: _F64, length: _F64, coil: _F64) -> _F64:
+    """Points (S, P, 3) [m] moved to a helix about each strand, in frames of least rotation.
+
+    Args:
+        points: (S, P, 3) float64 [m].
+        reference: (S, 3): direction of the first frame's first axis, as far as it is across the strand.
+        length: (S,) [m].
+        coil: (S, 6): radius [m], pitch [m], phase at the root [turns], second axis as a part of the first (negative
+            for the other hand), arc length [m] at which it begins, arc length [m] over which it reaches its radius.
+
+    Source: Wang, Juettler, Zheng and Liu, "Computation of Rotation Minimizing Frames" (2008).
+
+    """
+
+def shaken(points: _F64, length: _F64, sines: _F64, rise: _F64) -> _F64:
+    """Points (S, P, 3) [m] with sines (S, K, 5) added, K <= 8: period [m], phase [turns], amplitude x, y, z [m].
+
+    They grow from the root on, over the arc length `rise` (S,) [m].
+    """
+
+def drawn_in(
+    points: _F64,
+    length: _F64,
+    middles: _F64,
+    middle_length: _F64,
+    lock: NDArray[np.int64],
+    strength: _F64,
+    over: _F64,
+) -> _F64:
+    """Points (S, P, 3) [m] moved towards the point of their lock's middle at the same arc length s.
+
+    By strength (S,) * smoothstep(s / over (S,) [m]). The lock (S,) tells the middle (M, Q, 3) of length
+    middle_length (M,) [m]; a middle that is too short goes straight on.
+    """
+
+def outside(field: DistanceField, points: _F64, clearance: _F64, rounds: int) -> tuple[_F64, _F64]:
+    """Points (S, P, 3) [m] pushed out of the skin along its normal to clearance (P,) [m], and how deep each strand was.
+
+    Points of infinite (negative) clearance stay; the depth (S,) [m] is the greatest of all points and rounds.
+    """
+
+class Shape:
+    """Signed distance to parts joined in the order in which they are added; see parts.hpp for the formulas.
+
+    `join` is "add", "cut" or "clip" (what is outside of the part goes); `blend` [m] the width of the smooth minimum;
+    `box` (2, 3) the corners of a box that holds the part; `turn` (3, 3) takes world rows to the part's axes.
+    """
+
+    def __init__(self) -> None: ...
+    def ellipsoid(
+        self, join: str, blend: float, box: _F64, center: _F64, turn: _F64, radii: _F64
+    ) -> None: ...
+    def tube(self, join: str, blend: float, box: _F64, t: _F64, curve: _F64) -> None:
+        """A tube by samples of a curve: parameters (n,), and (3, n, 4) x, y, z, radius with two derivatives."""
+
+    def group(self, join: str, blend: float, box: _F64, center: _F64, turn: _F64, group: Shape) -> None:
+        """A shape in axes of its own."""
+
+    def distance(self, points: _F64, reach: float) -> _F64:
+        """Distances (N,) [m] of points (N, 3), valid only within `reach` [m] of the surface (infinite: everywhere)."""

@@ -32,14 +32,18 @@ static DistanceField make_field(Array<const float, -1, -1, -1> values, Array<con
     require(std::all_of(field.values.begin(), field.values.end(), [](float v) { return std::isfinite(v); }),
             "DistanceField: a value is not finite");
     field.measure_slope();
+    field.measure_bricks();
     return field;
 }
 
 static std::tuple<Doubles, Doubles> distance(const DistanceField &field, Array<const double, -1, 3> points) {
-    const int N = int(points.shape(0)), W = kLanes<double>;
+    const int N = int(points.shape(0));
     auto values = new_array<double>({size_t(N)}), normals = new_array<double>({size_t(N), 3});
-    for (int begin = 0; begin < N; begin += W) {
-        BlockIndex<double> index(begin / W, N);
+    nb::gil_scoped_release release;
+    const int blocks = block_count<double>(N);
+#pragma omp parallel for schedule(static, 256) num_threads(threads()) if (blocks > 4096)
+    for (int b = 0; b < blocks; ++b) {
+        BlockIndex<double> index(b, N);
         Vec3<double> x, gradient;
         Lanes<double> phi;
         gather(&x, points.data(), 1, index.strand);

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 namespace ringlet {
 
@@ -25,10 +26,11 @@ struct HeldStrands {
     Keys key;
     Factors scale, phase;
     uint32_t last_parent, last_guide;
+    std::vector<uint16_t> order;
 
     BoundStrands view() const {
-        return {int(guide.shape(0)), int(guide.shape(1)), parent.data(), root.data(), guide.data(),
-                weight.data(),       key.data(),          scale.data(),  phase.data()};
+        return {int(guide.shape(0)), int(guide.shape(1)), parent.data(), root.data(),  guide.data(),
+                weight.data(),       key.data(),          scale.data(),  phase.data(), &order};
     }
 };
 
@@ -45,7 +47,8 @@ static HeldStrands hold(Keys parent, Array<const float, -1, 3> root, Array<const
     require(weight.shape(1) == k, "BoundStrands: guide and weight have different shapes");
     for (size_t i = 0; i < N; ++i)
         require(weight.data()[i * k] > 0, "BoundStrands: the first guide of a strand must have a positive weight");
-    return {parent, root, guide, weight, key, scale, phase, greatest(parent.data(), N), greatest(guide.data(), N * k)};
+    return {parent, root, guide, weight, key, scale, phase, greatest(parent.data(), N), greatest(guide.data(), N * k),
+            in_patches(root.data(), N, threads())};
 }
 
 /// Python's moment: how the guides have turned, and where the skin has carried the roots.

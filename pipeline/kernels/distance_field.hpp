@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace ringlet {
@@ -17,6 +18,11 @@ struct DistanceField {
     int n[3];
     double origin[3], spacing;
     double steepest; // bound on the slope of the interpolated field: 1 for a true distance, a little more in cells
+
+    static constexpr int kBrick = 2; // cells along each side of a brick
+    std::vector<int8_t> least;       // least value of each brick in multiples of `step`, rounded down
+    int bricks[3];
+    float step;
 
     /// Largest slope over all cells, from the differences along their edges.
     void measure_slope() {
@@ -37,6 +43,32 @@ struct DistanceField {
                     worst = std::max(worst, square);
                 }
         steepest = std::max(1.0, std::sqrt(worst) / spacing);
+    }
+
+    /// Fills `least`.
+    void measure_bricks() {
+        for (int axis = 0; axis < 3; ++axis) bricks[axis] = (n[axis] - 2) / kBrick + 1;
+        const float lowest = *std::min_element(values.begin(), values.end());
+        step = std::max(float(spacing) / 2, -lowest / 127); // so that the lowest has a place
+        least.resize(size_t(bricks[0]) * bricks[1] * bricks[2] + 3); // `gather_bytes` reads a little further
+        int8_t *to = least.data();
+        for (int x = 0; x < bricks[0]; ++x)
+            for (int y = 0; y < bricks[1]; ++y)
+                for (int z = 0; z < bricks[2]; ++z) {
+                    const float steps = std::floor(least_in(kBrick * x, kBrick * y, kBrick * z) / step);
+                    *to++ = int8_t(std::min(std::max(steps, -128.0f), 127.0f));
+                }
+    }
+
+  private:
+    /// Least value of the nodes around the brick whose first node is (x, y, z).
+    float least_in(int x, int y, int z) const {
+        float lowest = values[(size_t(x) * n[1] + y) * n[2] + z];
+        for (int i = x; i <= std::min(x + kBrick, n[0] - 1); ++i)
+            for (int j = y; j <= std::min(y + kBrick, n[1] - 1); ++j)
+                for (int k = z; k <= std::min(z + kBrick, n[2] - 1); ++k)
+                    lowest = std::min(lowest, values[(size_t(i) * n[1] + j) * n[2] + k]);
+        return lowest;
     }
 };
 
@@ -73,6 +105,19 @@ __attribute__((noinline)) void sample(const DistanceField &field, Vec3<Real> x, 
     const L d0 = d00 + fb * (d01 - d00), d1 = d10 + fb * (d11 - d10);
     phi = y0 + fa * (y1 - y0);
     gradient = {y1 - y0, e0 + fa * (e1 - e0), d0 + fa * (d1 - d0)};
+}
+
+/// A number that the distance at x, as `sample` gives it, is not below: one read of a table that stays near the
+/// processor, where `sample` needs eight of the whole grid.
+RINGLET_INLINE Lanes<float> lower_bound(const DistanceField &field, Vec3<float> x) {
+    const float inverse = float(1 / field.spacing);
+    const auto brick = [&](Lanes<float> u, int axis) RINGLET_ALWAYS {
+        const Lanes<float> v = (u - float(field.origin[axis])) * inverse;
+        const Lanes<float> kept = minimum<float>(select<float>(v >= 0, v, Lanes<float>{}), splat(field.n[axis] - 1.001f));
+        return __builtin_convertvector(kept, Mask<float>) / DistanceField::kBrick;
+    };
+    const Mask<float> at = (brick(x.x, 0) * field.bricks[1] + brick(x.y, 1)) * field.bricks[2] + brick(x.z, 2);
+    return __builtin_convertvector(gather_bytes(field.least.data(), at), Lanes<float>) * field.step;
 }
 
 } // namespace ringlet

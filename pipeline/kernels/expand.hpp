@@ -13,6 +13,8 @@
 #include "block.hpp"
 #include "distance_field.hpp"
 #include "guide_motion.hpp"
+#include "patches.hpp"
+#include "transpose.hpp"
 #include "vary.hpp"
 
 namespace ringlet {
@@ -26,6 +28,7 @@ struct BoundStrands {
     const float *weight;
     const uint32_t *key;
     const float *scale, *phase;
+    const std::vector<uint16_t> *order; // see patches.hpp
 };
 
 inline constexpr int kGuidesMax = 8;
@@ -39,38 +42,16 @@ struct Rotation {
 
     RINGLET_INLINE Vec3<float> turn(Vec3<float> a) const {
         const Vec3<float> c = cross(u, a);
-        return a + (2 / dot(*this, *this)) * (w * c + cross(u, c));
+        return a + (2 * reciprocal<float>(dot(*this, *this))) * (w * c + cross(u, c));
     }
 };
 
 /// The guides that the strands of a block follow.
 struct Followed {
     int count;
-    int row[kGuidesMax][kLanes<float>]; // first rotation of the guide
+    Mask<float> row[kGuidesMax]; // first rotation of the guide
     Lanes<float> weight[kGuidesMax], step[kGuidesMax]; // step: the strand's spacing in spacings of the guide
 };
-
-typedef float Quad __attribute__((vector_size(16)));
-
-/// Sixteen quaternions, one after the other, to a lane each.
-RINGLET_INLINE Rotation transposed(const Quad (&of)[kLanes<float>]) {
-    Lanes<float> part[4];
-    __builtin_memcpy(part, of, sizeof part);
-    const auto split = [](Lanes<float> a, Lanes<float> b, Lanes<float> &wx, Lanes<float> &yz) {
-        wx = __builtin_shufflevector(a, b, 0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
-        yz = __builtin_shufflevector(a, b, 2, 6, 10, 14, 18, 22, 26, 30, 3, 7, 11, 15, 19, 23, 27, 31);
-    };
-    const auto first = [](Lanes<float> a, Lanes<float> b) {
-        return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
-    };
-    const auto second = [](Lanes<float> a, Lanes<float> b) {
-        return __builtin_shufflevector(a, b, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
-    };
-    Lanes<float> wx[2], yz[2];
-    split(part[0], part[1], wx[0], yz[0]);
-    split(part[2], part[3], wx[1], yz[1]);
-    return {first(wx[0], wx[1]), {second(wx[0], wx[1]), first(yz[0], yz[1]), second(yz[0], yz[1])}};
-}
 
 /// A_g where segment j of the strand is, between two segments of the guide; beyond the guide's tip its last one.
 RINGLET_INLINE Rotation rotation_at(const GuideMotion &motion, const Followed &to, int g, int j) {
@@ -78,15 +59,8 @@ RINGLET_INLINE Rotation rotation_at(const GuideMotion &motion, const Followed &t
     const Lanes<float> v = minimum<float>(u > 0 ? u : Lanes<float>{}, last);
     const Mask<float> i = __builtin_convertvector(minimum<float>(v, last - 1), Mask<float>);
     const Lanes<float> f = v - __builtin_convertvector(i, Lanes<float>);
-    Quad at[kLanes<float>];
-    for (int lane = 0; lane < kLanes<float>; ++lane) {
-        Quad here, next;
-        const float *from = motion.rotations.data() + 4 * (to.row[g][lane] + i[lane]);
-        __builtin_memcpy(&here, from, sizeof here);
-        __builtin_memcpy(&next, from + 4, sizeof next);
-        at[lane] = here + f[lane] * (next - here);
-    }
-    return transposed(at);
+    const Four q = read_between(motion.rotations.data(), to.row[g] + i, f);
+    return {q.part[0], {q.part[1], q.part[2], q.part[3]}};
 }
 
 /// R_j, a multiple of it. A guide whose rotation differs from the nearest one's by more than 60 degrees has parted
@@ -98,7 +72,7 @@ RINGLET_INLINE Rotation blended(const GuideMotion &motion, const Followed &to, i
     Rotation sum{to.weight[0] * nearest.w, to.weight[0] * nearest.u};
     for (int g = 1; g < to.count; ++g) {
         const Rotation other = rotation_at(motion, to, g, j);
-        const Lanes<float> c = dot(nearest, other), cos2 = c * c / (square * dot(other, other));
+        const Lanes<float> c = dot(nearest, other), cos2 = c * c * reciprocal<float>(square * dot(other, other));
         Lanes<float> near = (cos2 - kApart) * (1 / (kTogether - kApart));
         near = minimum<float>(maximum<float>(near, Lanes<float>{}), splat(1.0f));
         Lanes<float> weight = to.weight[g] * near * near * (3 - 2 * near);
@@ -119,17 +93,20 @@ class Skin {
         bound_ = at_root_;
     }
 
-    /// Tilts the segment t from x away from the head so that its end, at arc length s, is outside; keeps its length.
-    RINGLET_INLINE Vec3<float> clear(Vec3<float> x, Vec3<float> t, Lanes<float> s) {
+    /// Tilts the segment t of length `whole` from x away from the head so that its end, at arc length s, is outside.
+    RINGLET_INLINE Vec3<float> clear(Vec3<float> x, Vec3<float> t, Lanes<float> whole, Lanes<float> s) {
         // phi cannot fall faster than its steepest slope: most points need no sample
-        const Lanes<float> whole = length(t), keep = minimum<float>(splat(skin_), at_root_ + kRise * s);
+        const Lanes<float> keep = minimum<float>(splat(skin_), at_root_ + kRise * s);
         bound_ -= float(field_.steepest) * whole;
         Mask<float> near = bound_ < keep;
+        if (!any<float>(near)) return t;
+        bound_ = maximum<float>(bound_, lower_bound(field_, x + t));
+        near = bound_ < keep;
         for (int round = 0; round < kRounds && any<float>(near); ++round) {
             Lanes<float> phi;
             Vec3<float> gradient;
             sample<float>(field_, x + t, phi, gradient);
-            bound_ = near ? phi : bound_;
+            bound_ = phi;
             const Lanes<float> depth = keep - phi;
             near &= depth > 0;
             if (!any<float>(near)) break;
@@ -166,9 +143,11 @@ class Skin {
 struct ExpandScratch {
     Arena arena;
     Vec3<float> *x, *e;
+    Lanes<float> *whole; // lengths of the e
 
     explicit ExpandScratch(int P)
-        : arena(size_t(2 * P + 2) * sizeof(Vec3<float>)), x(arena.take<Vec3<float>>(P)), e(arena.take<Vec3<float>>(P)) {}
+        : arena(size_t(7 * P + 8) * sizeof(Lanes<float>)), x(arena.take<Vec3<float>>(P)), e(arena.take<Vec3<float>>(P)),
+          whole(arena.take<Lanes<float>>(P)) {}
 };
 
 /// One call: the groom (., P, 3), the strands and what moves them.
@@ -183,6 +162,7 @@ struct Expand {
 
     /// Points of strands begin .. begin+count to out (count, P, 3).
     void run(int begin, int count, float *out, int threads) const {
+        const std::vector<int> taken = taken_in_patches(*strands.order, size_t(begin), size_t(count));
         const int blocks = block_count<float>(count);
 #pragma omp parallel num_threads(threads)
         {
@@ -190,29 +170,34 @@ struct Expand {
 #pragma omp for schedule(dynamic, 16)
             for (int b = 0; b < blocks; ++b) {
                 const BlockIndex<float> index(b, count);
-                block(begin, index, scratch);
-                scatter(scratch.x, out, P, index);
+                int strand[kLanes<float>], row[kLanes<float>];
+                for (int lane = 0; lane < kLanes<float>; ++lane) {
+                    strand[lane] = taken[index.strand[lane]];
+                    row[lane] = strand[lane] - begin;
+                }
+                block(strand, scratch);
+                write_rows(&scratch.x->x, out, 3 * P, row, index.count);
             }
         }
     }
 
   private:
-    void block(int begin, const BlockIndex<float> &index, const ExpandScratch &scratch) const {
-        int strand[kLanes<float>];
-        for (int lane = 0; lane < kLanes<float>; ++lane) strand[lane] = begin + index.strand[lane];
+    /// Points of a block of strands to scratch.x.
+    void block(const int (&strand)[kLanes<float>], const ExpandScratch &scratch) const {
         Vec3<float> *x = scratch.x, *e = scratch.e, root;
+        const Lanes<float> *whole = scratch.whole;
         gather(&root, strands.root, 1, strand);
-        segments(strand, root, x, e);
-        Lanes<float> whole{};
-        for (int j = 0; j + 1 < P; ++j) whole += length(e[j]);
-        const Lanes<float> spacing = whole * (1.0f / (P - 1));
+        segments(strand, root, scratch);
+        Lanes<float> sum{};
+        for (int j = 0; j + 1 < P; ++j) sum += whole[j];
+        const Lanes<float> spacing = sum * (1.0f / (P - 1));
         const Followed to = followed(strand, spacing);
         if (place) gather(&root, place, 1, strand);
         x[0] = root;
         if (field) {
             Skin skin(*field, style.skin, root);
             for (int j = 0; j + 1 < P; ++j)
-                x[j + 1] = x[j] + skin.clear(x[j], blended(motion, to, j).turn(e[j]), (j + 1.0f) * spacing);
+                x[j + 1] = x[j] + skin.clear(x[j], blended(motion, to, j).turn(e[j]), whole[j], (j + 1.0f) * spacing);
         } else {
             for (int j = 0; j + 1 < P; ++j) x[j + 1] = x[j] + blended(motion, to, j).turn(e[j]);
         }
@@ -221,7 +206,8 @@ struct Expand {
     }
 
     /// Segments e at rest, of groom strands as they are and of copies varied; x is used for the parents' points.
-    void segments(const int (&strand)[kLanes<float>], Vec3<float> root, Vec3<float> *x, Vec3<float> *e) const {
+    void segments(const int (&strand)[kLanes<float>], Vec3<float> root, const ExpandScratch &scratch) const {
+        Vec3<float> *x = scratch.x, *e = scratch.e;
         int parent[kLanes<float>];
         Copies copies{};
         bool some = false;
@@ -236,10 +222,10 @@ struct Expand {
             copies.sine[lane] = copy ? std::sin(strands.phase[s]) : 0;
             some |= copy;
         }
-        gather(x, rest, P, parent);
-        for (int j = 0; j + 1 < P; ++j) e[j] = x[j + 1] - x[j];
+        read_rows(&x->x, rest, 3 * P, parent);
+        for (int j = 0; j + 1 < P; ++j) e[j] = x[j + 1] - x[j], scratch.whole[j] = length(e[j]);
         copies.offset = root - x[0];
-        if (some) vary(e, x, P, copies, style);
+        if (some) vary(e, scratch.whole, x, P, copies, style);
     }
 
     Followed followed(const int (&strand)[kLanes<float>], Lanes<float> spacing) const {

@@ -155,7 +155,8 @@ inline void turn_guide(const Tangents &of, float *rotation) {
             const Quaternion next = of.next(int(j), A);
             A = dot(A, next) < 0 ? Quaternion{-next.w, -next.x, -next.y, -next.z} : next;
         }
-        for (double part : {A.w, A.x, A.y, A.z}) *rotation++ = float(part);
+        // A guide at rest has turned by nothing but rounding: products of that are slow to multiply with
+        for (double part : {A.w, A.x, A.y, A.z}) *rotation++ = std::abs(part) < 1e-12 ? 0.0f : float(part);
     }
 }
 

@@ -128,7 +128,7 @@ class MeshDistance {
         for (int slab = 0; slab < (n[0] + kSlab - 1) / kSlab; ++slab)
             near_surface(slab * kSlab, std::min(n[0], (slab + 1) * kSlab));
         tell_sides();
-        for (int round = 0; round < 2; ++round)
+        for (int round = 0; round < 3; ++round)
             for (int axis = 0; axis < 3; ++axis) bring_feet(axis, threads);
         for (size_t k = 0; k < count; ++k) values[k] = inside_[k] ? -values[k] : values[k];
     }

@@ -32,6 +32,8 @@ void bind_energy(nb::module_ &m);
 void bind_mesh(nb::module_ &m);
 void bind_shade(nb::module_ &m);
 void bind_expand(nb::module_ &m);
+void bind_groom(nb::module_ &m);
+void bind_parts(nb::module_ &m);
 void bind_peak(nb::module_ &m);
 void bind_raster(nb::module_ &m);
 void bind_statics(nb::module_ &m);
@@ -51,6 +53,8 @@ NB_MODULE(RINGLET_MODULE, m) {
     ringlet::bind_energy(m);
     ringlet::bind_shade(m);
     ringlet::bind_expand(m);
+    ringlet::bind_groom(m);
+    ringlet::bind_parts(m);
     ringlet::bind_mesh(m);
     ringlet::bind_peak(m);
     ringlet::bind_raster(m);

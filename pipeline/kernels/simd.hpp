@@ -157,6 +157,18 @@ RINGLET_INLINE void gather_pairs(const float *values, Mask<Real> at, Lanes<Real>
 #endif
 }
 
+/// values[at] of every lane; three more bytes behind the last value may be read.
+RINGLET_INLINE Mask<float> gather_bytes(const int8_t *values, Mask<float> at) {
+#ifdef __AVX512F__
+    const __m512i four = _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), 0xffff, __m512i(at), values, 1);
+    return Mask<float>(four) << 24 >> 24;
+#else
+    Mask<float> result;
+    for (int lane = 0; lane < kLanes<float>; ++lane) result[lane] = values[at[lane]];
+    return result;
+#endif
+}
+
 template <class Real> struct Vec3 {
     Lanes<Real> x, y, z;
 

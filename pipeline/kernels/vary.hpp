@@ -58,13 +58,15 @@ class Noise {
     Vec3<float> from_, to_;
 };
 
-/// Turns the parents' segments e (P-1) into those of the copies; x (P) are the parents' points.
+/// Turns the parents' segments e (P-1) and their lengths into those of the copies; x (P) are the parents' points.
 ///
 /// Phase: a segment is turned about the smoothed direction of its strand, the chord over a quarter of its length
 /// (shorter at the ends), which leaves that direction and the curl's radius as they are. Clump: the offset of the
 /// roots is taken back more and more towards the tip.
-inline void vary(Vec3<float> *e, const Vec3<float> *x, int P, const Copies &copies, const ExpandStyle &style) {
+inline void vary(Vec3<float> *e, Lanes<float> *whole, const Vec3<float> *x, int P, const Copies &copies,
+                 const ExpandStyle &style) {
     const Lanes<float> none = splat(1e-30f); // keeps a direction that does not exist finite
+    const Lanes<float> scale = select<float>(copies.varied, copies.scale, splat(1.0f));
     const int half = (P - 1) / 8;
     const float closing = 2 * style.clump / (float(P - 1) * float(P - 1));
     Noise noise(copies.key);
@@ -72,14 +74,14 @@ inline void vary(Vec3<float> *e, const Vec3<float> *x, int P, const Copies &copi
         int reach = half < j ? half : j;
         if (P - 2 - j < reach) reach = P - 2 - j;
         const Vec3<float> chord = x[j + 1 + reach] - x[j - reach];
-        const Vec3<float> axis = (1 / (length(chord) + none)) * chord;
+        const Vec3<float> axis = inverse_root<float>(dot(chord, chord) + none) * chord;
         // Rodrigues about the chord, then clump and frizz
         Vec3<float> d = copies.cosine * e[j] + copies.sine * cross(axis, e[j]) +
                         ((1 - copies.cosine) * dot(axis, e[j])) * axis;
-        const Lanes<float> whole = length(e[j]);
         if (j > 0) d = d - splat((j + 0.5f) * closing) * copies.offset;
-        d = d + (style.frizz * whole) * noise.at(j);
-        d = (copies.scale * whole / (length(d) + none)) * d;
+        d = d + (style.frizz * whole[j]) * noise.at(j);
+        whole[j] *= scale;
+        d = (whole[j] * inverse_root<float>(dot(d, d) + none)) * d;
         e[j] = select(copies.varied, d, e[j]);
     }
 }

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline import kernels
+
 Index = NDArray[np.integer[Any]]
 
 _PAIR = 0x5BD1  # salt of the second number of a normal
@@ -16,12 +18,8 @@ _PAIR = 0x5BD1  # salt of the second number of a normal
 
 def hashed(seed: int, index: Index, salt: int) -> NDArray[np.uint32]:
     """Hash each index; uint32 of the index's shape."""
-    with np.errstate(over="ignore"):
-        h = np.asarray(index).astype(np.uint32) * np.uint32(0x9E3779B1)
-        h += np.uint32((seed * 0x85EBCA6B + salt * 0xC2B2AE35) & 0xFFFFFFFF)
-        for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B)):
-            h = (h ^ (h >> np.uint32(shift))) * np.uint32(factor)
-        return h ^ (h >> np.uint32(16))
+    flat = np.ascontiguousarray(np.ravel(index).astype(np.uint32))
+    return kernels.hashed(flat, _word(seed, salt)).reshape(np.shape(index))
 
 
 def uniform(seed: int, index: Index, salt: int) -> NDArray[np.float64]:
@@ -31,5 +29,11 @@ def uniform(seed: int, index: Index, salt: int) -> NDArray[np.float64]:
 
 def normal(seed: int, index: Index, salt: int) -> NDArray[np.float64]:
     """Standard normal numbers (Box and Muller 1958), one for each index."""
-    radius = np.sqrt(-2 * np.log1p(-uniform(seed, index, salt)))
-    return np.asarray(radius * np.cos(2 * np.pi * uniform(seed, index, salt ^ _PAIR)))
+    flat = np.ascontiguousarray(np.ravel(index).astype(np.uint32))
+    numbers = kernels.normal(flat, _word(seed, salt), _word(seed, salt ^ _PAIR))
+    return numbers.reshape(np.shape(index))
+
+
+def _word(seed: int, salt: int) -> int:
+    """What is added to the scrambled index: 32 bits of the seed and the salt."""
+    return (seed * 0x85EBCA6B + salt * 0xC2B2AE35) & 0xFFFFFFFF

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 Points = NDArray[np.floating[Any]]
 
+_FINE = 1 << 40  # parts of a strand that are told apart
+
 
 def arc_length(points: Points) -> NDArray[np.float64]:
     """Arc length (S, P) [m] from the root to each point of (S, P, 3) [m]."""
@@ -20,9 +22,8 @@ def segments_at(lengths: NDArray[np.float64], wanted: NDArray[np.float64]) -> ND
     strands, count = lengths.shape
     row = np.arange(strands)[:, None]
     whole = np.maximum(lengths[:, -1:], 1e-300)
-    along, sought = (
-        2 * row + at / whole for at in (lengths, wanted)
-    )  # in a row, so that one search serves all
+    # In a row, so that one search serves all; in whole numbers, so that a strand's place in it changes nothing.
+    along, sought = ((at / whole * _FINE).astype(np.int64) + 2 * _FINE * row for at in (lengths, wanted))
     left = np.searchsorted(along.ravel(), sought.ravel(), "right").reshape(wanted.shape) - 1 - row * count
     return np.asarray(np.clip(left, 0, count - 2))
 

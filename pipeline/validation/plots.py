@@ -27,10 +27,10 @@ _MARKS: dict[Model, tuple[str, int]] = {
 }
 
 
-def need_matplotlib() -> None:
+def need_matplotlib(command: str = "ringlet validate") -> None:
     """Raise InputError when matplotlib is missing."""
     if find_spec("matplotlib") is None:
-        raise InputError('ringlet validate: pictures need matplotlib: pip install "ringlet[plots]"')
+        raise InputError(f'{command}: pictures need matplotlib: pip install "ringlet[plots]"')
 
 
 def draw(results: Sequence[CaseResult], folder: Path) -> dict[str, str]:

@@ -110,8 +110,8 @@ def test_overrides_need_no_quotes_and_reach_into_lists(tmp_path: Path) -> None:
             'x.toml:2: simulate.hair.radius: expected a number with a unit, such as "1 m", got "40"',
         ),
         (
-            '[groom.cut]\nlength = "-3 cm"',
-            'x.toml:2: groom.cut.length: expected to be greater than 0, got "-3 cm"',
+            '[groom.swatch]\nlength = "-3 cm"',
+            'x.toml:2: groom.swatch.length: expected to be greater than 0, got "-3 cm"',
         ),
         ("[groom]\nstrands = 0", "x.toml:2: groom.strands: expected to be greater than or equal to 1, got 0"),
         ("[groom]\nstrands = 1.5", "x.toml:2: groom.strands: expected an integer, got 1.5"),

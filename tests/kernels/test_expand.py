@@ -109,6 +109,21 @@ def test_points_depend_neither_on_chunks_nor_on_threads(cuts: list[int], threads
     assert np.concatenate(chunks).tobytes() == expected.tobytes()
 
 
+def test_a_strand_is_the_same_whichever_strands_share_its_block() -> None:
+    """Blocks are made of neighbours on the skin, tile by tile; a chunk may begin and end inside a tile."""
+    groom, rest = round_groom(STRANDS, 12, GUIDES)
+    binding = whole(groom, Interpolate(strands=40_000), seed=5)
+    guides = rest[groom.guides.strand]
+    expansion = Expansion(rest, guides, binding, sphere(), VARIED)
+    expansion.frame(swung(guides, 1.0), TURNED)
+    expected = everything(expansion)
+    cuts = [0, 1, 3000, 16_384, 20_001, 33_000, 40_000]
+    chunks = np.concatenate([expansion.chunk(a, b) for a, b in pairwise(cuts)])
+    differing = (chunks != expected).any(axis=(1, 2)).sum()
+    print(f"{differing} of {len(expected)} strands differ between chunks {cuts} and one piece")
+    assert chunks.tobytes() == expected.tobytes()
+
+
 @pytest.mark.parametrize("angle", [0.5, 1.0, -1.5])
 def test_strands_stay_out_of_the_head(angle: float) -> None:
     """At least the skin's distance, as far as it is reached within a quarter of the arc length."""

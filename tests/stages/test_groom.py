@@ -10,20 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline import cache
-from pipeline.config.schema import (
-    Clump,
-    Config,
-    Contact,
-    Curl,
-    Frizz,
-    Groom,
-    Parting,
-    Scene,
-    Simulate,
-    Swatch,
-)
+from pipeline.config.schema import Config, Contact, Curl, Groom, Parting, Scene, Swatch
 from pipeline.groom import stage
-from pipeline.groom.curls import curled
 from pipeline.groom.head.distance import distance
 from pipeline.groom.heads import Head
 from pipeline.groom.procedural import Style
@@ -31,15 +19,9 @@ from pipeline.groom.roots import place_roots
 from pipeline.groom.swatch import swatch
 from pipeline.strands.random import normal, uniform
 from pipeline.strands.strands import Strands
+from tests.stages.conftest import shipped
 
 COLUMNS = ("points", "held", "normal", "side", "key")
-CURLY = Groom(
-    strands=800,
-    points=64,
-    small_clumps=Clump(count=500, strength=0.7),
-    curl=Curl(radius=0.009, pitch=0.034, flatness=0.9, shared_by="small"),
-    frizz=Frizz(amplitude=0.0008),
-)
 
 
 def unequal(points: NDArray[Any]) -> float:
@@ -54,14 +36,14 @@ def assert_same(a: Strands, b: Strands) -> None:
 
 
 def test_a_strand_is_the_same_at_any_count(mannequin: Head, wavy: Strands) -> None:
-    few = Style(Config(name="few", groom=Groom(strands=1000)), mannequin).strands(0, 1000)
+    few = Style(shipped("default", strands=1000), mannequin).strands(0, 1000)
     moved = np.abs(few.points - wavy.points[:1000]).max()
     print(f"1,000 strands against the first of 5,000: largest difference {moved:.1e} m")
     assert_same(few, Strands(**{name: getattr(wavy, name)[:1000] for name in COLUMNS}))
 
 
 def test_any_chunking_gives_the_same_strands(mannequin: Head) -> None:
-    style = Style(Config(name="curly", groom=CURLY), mannequin)
+    style = Style(shipped("curly", strands=800), mannequin)
     whole = style.strands(0, 800)
     for edges in ([0, 1, 8, 137, 800], [0, 333, 334, 799, 800]):
         for first, last in pairwise(edges):
@@ -70,7 +52,8 @@ def test_any_chunking_gives_the_same_strands(mannequin: Head) -> None:
 
 
 def test_seeds_give_other_strands(mannequin: Head, wavy: Strands) -> None:
-    other = Style(Config(name="other", seed=2, groom=Groom(strands=200)), mannequin).strands(0, 200)
+    config = shipped("default", strands=200).model_copy(update={"seed": 2})
+    other = Style(config, mannequin).strands(0, 200)
     apart = np.linalg.norm(other.points - wavy.points[:200], axis=2).mean()
     print(f"mean distance of points under two seeds: {1000 * apart:.1f} mm")
     assert apart > 0.01
@@ -85,7 +68,7 @@ def test_roots_lie_on_the_skin(wavy: Strands) -> None:
 
 @pytest.mark.parametrize("look", ["wavy", "curly"])
 def test_segments_of_a_strand_are_equal(mannequin: Head, wavy: Strands, look: str) -> None:
-    strands = wavy if look == "wavy" else Style(Config(name="c", groom=CURLY), mannequin).strands(0, 800)
+    strands = wavy if look == "wavy" else Style(shipped("curly", strands=800), mannequin).strands(0, 800)
     worst = unequal(strands.points)
     print(f"{look}: worst deviation of a segment {worst:.1e}")
     assert worst < 1e-3
@@ -161,35 +144,6 @@ def test_a_parting_moves_sideways_and_can_be_switched_off(mannequin: Head) -> No
     assert (sides(Parting(enabled=False)) == 0).all()
 
 
-def test_a_curl_is_a_helix_of_the_wanted_radius_and_pitch() -> None:
-    curl = Curl(
-        radius=0.005,
-        radius_jitter=0,
-        pitch=0.02,
-        pitch_jitter=0,
-        flatness=1,
-        onset=0,
-        ramp=1e-6,
-        phase_jitter=0,
-    )
-    along = np.tile(np.linspace(0, 0.2, 400), (20, 1))
-    points = np.stack([0 * along, -along, 0 * along], axis=2)
-    index = np.arange(20)
-    found = curled(curl, 1, index, index, points, along, np.tile([1.0, 0, 0], (20, 1)))[:, 1:]
-    radius = np.hypot(found[..., 0], found[..., 2])
-    turns = np.unwrap(np.arctan2(found[..., 2], found[..., 0]), axis=1)
-    pitch = 2 * np.pi * (along[:, -1] - along[:, 1]) / np.abs(turns[:, -1] - turns[:, 0])
-    hands = np.unique(np.sign(turns[:, -1] - turns[:, 0]))
-    print(
-        f"radius {radius.min():.5f} to {radius.max():.5f} m, pitch {pitch.min():.4f} to {pitch.max():.4f} m"
-    )
-    assert np.ptp(radius, axis=1).max() < 1e-9
-    assert radius.max() < 0.005 * 1.151
-    assert radius.min() > 0.005 * 0.849
-    assert np.abs(pitch / 0.02 - 1).max() < 0.2
-    assert hands.tolist() == [-1, 1]
-
-
 def test_random_numbers_are_uniform_and_apart() -> None:
     index = np.arange(100_000)
     u, v = uniform(5, index, 1), uniform(5, index, 2)
@@ -211,7 +165,8 @@ def test_random_numbers_are_uniform_and_apart() -> None:
 @pytest.mark.parametrize("radius", [0.0, 0.004])
 def test_a_swatch_has_the_wanted_length_and_direction(radius: float) -> None:
     patch = Swatch(direction=(0, 0, 2), size=0.02, length=0.1, pin_tips=True)
-    groom = Groom(source="swatch", strands=50, swatch=patch, curl=Curl(radius=radius, pitch=0.03))
+    style = {"curls": Curl(op="curl", radius=radius, pitch=0.03)}
+    groom = Groom(source="swatch", strands=50, swatch=patch, style=style)
     strands = swatch(Config(name="s", scene=Scene(head="none"), groom=groom))
     tip = strands.points[:, -1] - strands.points[:, 0]
     print(
@@ -232,7 +187,7 @@ def test_a_single_strand_of_a_swatch_starts_at_the_origin() -> None:
 
 
 def test_without_a_head_the_groom_has_none(tmp_path: Path) -> None:
-    groom = Groom(source="swatch", strands=40, guides=7, curl=Curl(radius=0))
+    groom = Groom(source="swatch", strands=40, guides=7)
     config = Config(name="s", scene=Scene(head="none"), groom=groom)
     experiment = cache.Experiment(tmp_path)
     stage.execute(config, experiment, "key")
@@ -247,7 +202,7 @@ def test_the_stage_writes_the_same_bytes_again(
     tmp_path: Path, mannequin: Head, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stage, "make_head", lambda _config: mannequin)
-    config = Config(name="again", groom=Groom(strands=9000, guides=60))
+    config = shipped("default", strands=9000, guides=60)
     made = []
     for name in ("a", "b"):
         experiment = cache.Experiment(tmp_path / name)
@@ -264,7 +219,7 @@ def test_the_stage_writes_the_same_bytes_again(
 
 def test_guides_keep_most_of_their_groomed_distance_up_to_the_layer(mannequin: Head, wavy: Strands) -> None:
     contact, points = Contact(offset=0.001, layer=0.02), wavy.points[:300]
-    offset = stage.contact_offset(Config(name="o", simulate=Simulate(contact=contact)), mannequin, points)
+    offset = stage.contact_offset(contact, mannequin.field, points)
     groomed = mannequin.field.distance(points.reshape(-1, 3)).reshape(300, -1)
     above = (offset - np.maximum(groomed, contact.offset)).max()
     steps = np.abs(np.diff(offset[:, 1:], axis=1)).max(axis=1) / wavy.spacing[:300]

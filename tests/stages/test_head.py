@@ -99,7 +99,7 @@ def test_the_grid_is_a_distance_everywhere(mannequin: Head) -> None:
     values, spacing = mannequin.field.values, mannequin.field.spacing
     steps = np.concatenate([np.abs(np.diff(values, axis=k)).ravel() for k in range(3)]) / spacing
     print(f"steepest edge {steps.max():.2f}; steeper than 1.05: {100 * (steps > 1.05).mean():.2f} %")
-    assert steps.max() < 2
+    assert steps.max() < 1.5
     assert (steps > 1.05).mean() < 0.005
 
 

@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pipeline.body.normals import point_normals
-from pipeline.config.schema import Config, Contact, Groom, Scene, Simulate
+from pipeline.config.schema import Config, Contact, Scene, Simulate
 from pipeline.errors import InputError
 from pipeline.groom.head_field import distance_grid
 from pipeline.groom.head_mesh import load_mesh
 from pipeline.groom.heads import make_head
 from pipeline.groom.procedural import Style
+from tests.stages.conftest import shipped
 
 SHARED = Path(__file__).parents[2].parent / "shared/data/heads"
 HEADS = {
@@ -292,7 +293,7 @@ def test_hair_grows_on_real_heads(name: str) -> None:
         {
             "name": "real",
             "scene": Scene(head=str(path), up_axis=axis, unit_scale=scale).model_dump(),
-            "groom": Groom(strands=1500, guides=100).model_dump(),
+            "groom": shipped("default", strands=1500, guides=100).groom.model_dump(),
             "simulate": Simulate(contact=Contact(spacing=0.004)).model_dump(),
         }
     )

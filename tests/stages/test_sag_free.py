@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipeline import cache, kernels
 from pipeline.cli.inspect import contents
 from pipeline.config import load
-from pipeline.config.schema import Config, Hair, Keyframe, Motion, SagFree, Simulate
+from pipeline.config.schema import Config, Contact, Hair, Keyframe, Motion, SagFree, Simulate
 from pipeline.errors import InputError
 from pipeline.groom import imported
 from pipeline.groom.heads import Head, make_head
@@ -46,7 +46,7 @@ def guides_of(
 def on_head(points: NDArray[np.floating], head: Head) -> Guides:
     """Guides with the contact offsets that the groom stage gives them."""
     x = points.astype(np.float32)
-    return guides_of(x, contact_offset(Config(name="test"), head, x), head)
+    return guides_of(x, contact_offset(Contact(), head.field, x), head)
 
 
 def free_grooms(name: str) -> Guides:

@@ -8,22 +8,38 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from pipeline.config.schema.base import Section
-from pipeline.config.schema.groom import Clump, Curl, Cut, Frizz, Groom, Parting, Path, Swatch
+from pipeline.config.schema.groom import Groom, Parting, Swatch
 from pipeline.config.schema.hair_contact import HairContact
 from pipeline.config.schema.interpolate import Interpolate, Variation
 from pipeline.config.schema.render import Fibre, Render
 from pipeline.config.schema.scene import Camera, Light, Scene
 from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, SagFree, Simulate
+from pipeline.config.schema.style import (
+    AnyOperator,
+    Clump,
+    Curl,
+    Direction,
+    Flyaway,
+    Frizz,
+    Lengths,
+    Operator,
+    Sphere,
+    Trim,
+    Wave,
+)
+from pipeline.config.schema.varying import Varied, VariedAngle, VariedFraction, VariedLength
 
 __all__ = [
     "Air",
+    "AnyOperator",
     "Camera",
     "Clump",
     "Config",
     "Contact",
     "Curl",
-    "Cut",
+    "Direction",
     "Fibre",
+    "Flyaway",
     "Frizz",
     "Groom",
     "Hair",
@@ -31,17 +47,25 @@ __all__ = [
     "Interpolate",
     "Keyframe",
     "Keyframes",
+    "Lengths",
     "Light",
     "Motion",
+    "Operator",
     "Parting",
-    "Path",
     "Render",
     "SagFree",
     "Scene",
     "Section",
     "Simulate",
+    "Sphere",
     "Swatch",
+    "Trim",
     "Variation",
+    "Varied",
+    "VariedAngle",
+    "VariedFraction",
+    "VariedLength",
+    "Wave",
 ]
 
 

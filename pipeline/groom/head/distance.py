@@ -1,9 +1,7 @@
 """Signed distance to the head: primitives, and the fold that joins them.
 
-Points are (N, 3) [m], distances (N,) [m], negative inside. Ellipsoid: k0 (k0 - 1) / k1 with k0 = |q/r|,
-k1 = |q/r^2|. Tube: nearest sample of a natural cubic spline, then one Newton step on (c - p) . c' = 0.
-Smooth minimum: min(a, b) - k h^3 / 6 with h = max(k - |a - b|, 0) / k. It makes |d| too small near blends, never
-too large outside: contact takes its distances from the mesh instead.
+Points are (N, 3) [m], distances (N,) [m], negative inside. The formulas are those of `kernels.Shape`. Its smooth
+minimum makes |d| too small near blends, never too large outside: contact takes its distances from the mesh instead.
 """
 
 from collections.abc import Sequence
@@ -14,28 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from pipeline import kernels
 from pipeline.groom.head.table import load_table
 
 Points = NDArray[np.floating[Any]]
 Distances = NDArray[np.floating[Any]]
 
 FOLD = 2e-3  # [m] half-width over which |x| is rounded off
-_BLOCK = 4096  # points whose parts stay in the processor's cache
 
 
 def distance(p: Points, reach: float = np.inf) -> Distances:
     """Signed distance of points to the head; valid only within `reach` [m] of the surface."""
-    p = np.array(p, copy=True)
-    p[:, 0] = np.sqrt(p[:, 0] ** 2 + FOLD**2)
-    d = np.empty(len(p), p.dtype)
-    for a in range(0, len(p), _BLOCK):
-        d[a : a + _BLOCK] = fold_parts(p[a : a + _BLOCK], load_table()["parts"], reach)
-    return d
+    q = np.array(p, np.float64)
+    q[:, 0] = np.sqrt(q[:, 0] ** 2 + FOLD**2)
+    return _head().distance(q, reach)
 
 
 def value_and_gradient(p: Points, reach: float = np.inf, eps: float = 3e-4) -> tuple[Distances, Points]:
     """Distance (N,) and its gradient (N, 3), by differences on the corners of a tetrahedron of size `eps` [m]."""
-    corners = np.array([[1, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]], p.dtype)
+    corners = np.array([[1, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]], float)
     d = [distance(p + eps * corner, reach) for corner in corners]
     return np.asarray(sum(d)) / 4, np.stack(d, -1) @ corners / (4 * eps)
 
@@ -49,44 +44,8 @@ def foot(p: Points, steps: int = 2, reach: float = np.inf) -> tuple[Points, Poin
 
 
 def fold_parts(p: Points, parts: Sequence[dict[str, Any]], reach: float) -> Distances:
-    """Join the parts in order; each is evaluated only where it can matter within `reach` of the surface."""
-    d = np.full(len(p), 1.0, p.dtype)
-    blends = np.array([part["blend"] for part in parts])
-    for i, part in enumerate(parts):
-        near = np.arange(len(p)) if np.isinf(reach) else _close_to(p, part, reach + blends[i:].max())
-        if len(near):
-            d[near] = _join(d[near], _primitive(p[near], part), part)
-    return d
-
-
-def ellipsoid(
-    p: Points, center: Sequence[float], radii: Sequence[float], turn: Sequence[float] = (0, 0, 0)
-) -> Distances:
-    """First-order distance to an ellipsoid; `turn` is in degrees about x, then y, then z."""
-    q = (p - np.asarray(center, p.dtype)) @ rotation(turn).astype(p.dtype) / np.asarray(radii, p.dtype)
-    k0 = norm(q) + 1e-9
-    q /= np.asarray(radii, p.dtype)
-    return np.asarray(k0 * (k0 - 1) / (norm(q) + 1e-9))
-
-
-def tube(p: Points, knots: Sequence[Sequence[float]]) -> Distances:
-    """Distance to a round tube along the natural cubic spline through knots [x, y, z, radius]."""
-    curve = _spline(tuple(map(tuple, knots)))
-    t = np.linspace(0, curve.x[-1], 6 * len(knots) - 5)
-    c, v, a = (curve(t, order).astype(p.dtype) for order in range(3))
-    i = np.argmin(dot(c[:, :3], c[:, :3]) - 2 * p @ c[:, :3].T, axis=1)
-    c, v, a = c[i], v[i], a[i]
-    e, vv = c[:, :3] - p, dot(v[:, :3], v[:, :3])
-    s = -dot(e, v[:, :3]) / np.maximum(vv + dot(e, a[:, :3]), 0.3 * vv)
-    s = np.clip(s, -t[i], t[-1] - t[i]).astype(p.dtype)[:, None]
-    c = c + s * v + s * s / 2 * a
-    return np.asarray(norm(p - c[:, :3]) - c[:, 3])
-
-
-def smooth_min(a: Distances, b: Distances, k: float) -> Distances:
-    """Smooth minimum: equals min(a, b) wherever |a - b| >= k; C2 elsewhere."""
-    h = np.maximum(k - np.abs(a - b), 0) / k
-    return np.minimum(a, b) - k / 6 * h**3
+    """Distances (N,) to the parts joined in order; each is evaluated only where it can matter within `reach`."""
+    return _shape(parts).distance(np.ascontiguousarray(p, np.float64), reach)
 
 
 def rotation(turn: Sequence[float]) -> NDArray[np.float64]:
@@ -113,48 +72,41 @@ def smoothstep(t: Distances) -> Distances:
     return t * t * (3 - 2 * t)
 
 
-def _primitive(p: Points, part: dict[str, Any]) -> Distances:
-    if "parts" in part:
-        turned = (p - np.asarray(part["center"], p.dtype)) @ rotation(part["turn"]).astype(p.dtype)
-        return fold_parts(turned, part["parts"], np.inf)
-    if "knots" in part:
-        return tube(p, part["knots"])
-    return ellipsoid(p, part["center"], part["radii"], part.get("turn", (0, 0, 0)))
-
-
-def _join(d: Distances, b: Distances, part: dict[str, Any]) -> Distances:
-    k = part["blend"]
-    match part.get("op", "add"):
-        case "add":
-            return smooth_min(d, b, k)
-        case "cut":
-            return -smooth_min(-d, b, k)
-        case _:  # clip
-            return -smooth_min(-d, -b, k)
-
-
-def _close_to(p: Points, part: dict[str, Any], margin: float) -> NDArray[np.intp]:
-    """Points whose distance to a part's box is at most `margin`."""
-    if part.get("op") == "clip":
-        return np.arange(len(p))
-    lo, hi = _box(part)
-    inside = np.ones(len(p), bool)
-    for x, a, b in zip(p.T, lo - margin, hi + margin, strict=True):
-        inside &= (x > p.dtype.type(a)) & (x < p.dtype.type(b))
-    return np.flatnonzero(inside)
-
-
-def _box(part: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    if "knots" in part:
-        curve = _spline(tuple(map(tuple, part["knots"])))
-        k = curve(np.linspace(0, curve.x[-1], 20))
-        return (k[:, :3] - k[:, 3:]).min(0), (k[:, :3] + k[:, 3:]).max(0)
-    reach = part.get("size") or max(part["radii"])
-    return np.asarray(part["center"]) - reach, np.asarray(part["center"]) + reach
-
-
 @cache
-def _spline(knots: tuple[tuple[float, ...], ...]) -> CubicSpline:
+def _head() -> kernels.Shape:
+    return _shape(load_table()["parts"])
+
+
+def _shape(parts: Sequence[dict[str, Any]]) -> kernels.Shape:
+    """The parts of a table: ellipsoids (center, radii), tubes (knots x, y, z, radius) and groups of parts.
+
+    `turn` is in degrees about x, then y, then z; a tube follows the natural cubic spline through its knots.
+    """
+    shape = kernels.Shape()
+    for part in parts:
+        join, blend = part.get("op", "add"), part.get("blend", 0.0)
+        if "knots" in part:
+            curve = _spline(part["knots"])
+            t = np.linspace(0, curve.x[-1], 6 * len(part["knots"]) - 5)
+            shape.tube(join, blend, _tube_box(curve), t, np.stack([curve(t, order) for order in range(3)]))
+            continue
+        center, turn = np.array(part["center"], float), rotation(part.get("turn", (0, 0, 0)))
+        size = part.get("size") or max(part["radii"])
+        box = np.stack([center - size, center + size])
+        if "parts" in part:
+            shape.group(join, blend, box, center, turn, _shape(part["parts"]))
+        else:
+            shape.ellipsoid(join, blend, box, center, turn, np.array(part["radii"], float))
+    return shape
+
+
+def _tube_box(curve: CubicSpline) -> NDArray[np.float64]:
+    """The box (2, 3) around a tube, from corner to corner."""
+    k = curve(np.linspace(0, curve.x[-1], 20))
+    return np.stack([(k[:, :3] - k[:, 3:]).min(0), (k[:, :3] + k[:, 3:]).max(0)])
+
+
+def _spline(knots: Sequence[Sequence[float]]) -> CubicSpline:
     k = np.asarray(knots, float)
     chord = np.r_[0, np.cumsum(norm(np.diff(k[:, :3], axis=0)))]
     return CubicSpline(chord, k, bc_type="natural")

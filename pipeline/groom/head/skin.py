@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.groom.head.distance import distance, ellipsoid, smoothstep, tube
+from pipeline.groom.head.distance import distance, fold_parts, smoothstep
 from pipeline.groom.head.table import load_table
 
 Points = NDArray[np.floating[Any]]
@@ -36,7 +36,7 @@ def _painted(p: Points, tone: str) -> Points:
     table = load_table()
     colour = np.tile(np.array(table["skin"][tone]), (len(p), 1))
     for spot in table["paint"]:
-        d = tube(q, spot["knots"]) if "knots" in spot else ellipsoid(q, spot["center"], spot["radii"])
+        d = fold_parts(q, [spot], np.inf)
         weight = spot["strength"] * smoothstep(1 - d / spot["soft"])[:, None]
         colour += weight * (np.array(spot["color"]) - colour)
     return colour

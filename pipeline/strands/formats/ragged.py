@@ -1,5 +1,6 @@
 """Strands of any number of points, as files hold them; and reading that trusts no header."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,12 @@ class Ragged:
     """(S,): points of each strand; their sum is N."""
     pins: NDArray[np.uint8]
     """(S, 2): points held at root and tip."""
+    widths: NDArray[np.float32] | None = None
+    """(N,): diameters in the file's unit, where the file has them."""
+    metres: float | None = None
+    """Metres in the file's unit, where the file says so."""
+    up_axis: str | None = None
+    """"y" or "z", where the file says so."""
 
     def __len__(self) -> int:
         return len(self.counts)
@@ -34,6 +41,27 @@ class Ragged:
     def first(self) -> NDArray[np.int64]:
         """(S,): index of each strand's root in `points`."""
         return np.cumsum(self.counts) - self.counts
+
+
+def gathered(pieces: Sequence[Ragged], metres: float | None = None, up_axis: str | None = None) -> Ragged:
+    """All strands of several pieces, in order; widths are nan for pieces without, and None where no piece has them."""
+    widths = None
+    if any(piece.widths is not None for piece in pieces):
+        nothing = np.float32(np.nan)
+        widths = np.concatenate(
+            [
+                np.full(len(piece.points), nothing) if piece.widths is None else piece.widths
+                for piece in pieces
+            ]
+        )
+    return Ragged(
+        points=np.concatenate([piece.points for piece in pieces]),
+        counts=np.concatenate([piece.counts for piece in pieces]),
+        pins=np.concatenate([piece.pins for piece in pieces]),
+        widths=widths,
+        metres=metres,
+        up_axis=up_axis,
+    )
 
 
 class Bytes:

@@ -182,6 +182,6 @@ def test_any_bytes_give_strands_or_a_message(tmp_path: Path, ending: str, data: 
 
 def test_an_unknown_ending_and_a_missing_file_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"unknown kind of groom file.*\.data, \.hair, \.tfx"):
-        read_groom(tmp_path / "groom.abc")
+        read_groom(tmp_path / "groom.obj")
     with pytest.raises(InputError, match="no such groom file"):
         read_groom(tmp_path / "groom.tfx")

@@ -1,0 +1,76 @@
+"""What hair grows on, and what is the same for all operators of a style."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.config.schema import Varied
+from pipeline.errors import InputError
+from pipeline.groom.head import scalp
+from pipeline.groom.head_field import Field
+from pipeline.groom.heads import Head
+from pipeline.groom.partings import PartingLine
+from pipeline.groom.style.fields import Scalp, varied
+from pipeline.groom.style.hair import Hair, Middles, Vectors, unit
+
+_WHORL = 0.35  # [rad] turn of the flow about the whorl where there is no parting
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Skin, wall (the skin with a guard in front of the face) and the parting."""
+
+    skin: Field
+    wall: Field
+    parting: PartingLine | None
+
+    def side(self, roots: Vectors) -> NDArray[np.int8]:
+        """Side of the parting (N,) that roots lie on: 1 left, -1 right, 0 where there is none."""
+        return self.parting.side(roots) if self.parting else np.zeros(len(roots), np.int8)
+
+    def flow(self, side: NDArray[np.int8], p: Vectors, n: Vectors) -> Vectors:
+        """Tangential unit direction of the combing: away from the parting, or from the whorl, and around its end."""
+        if self.parting is not None:
+            away, swirl = self.parting.away(p, side), self.parting.swirl(p)[:, None]
+        else:
+            away, swirl = -np.broadcast_to(scalp.whorl(), p.shape), np.full((1, 1), _WHORL)
+        away = unit(tangential(away, n))
+        return np.asarray(np.cos(swirl) * away + np.sin(swirl) * np.cross(n, away))
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A style's surroundings."""
+
+    seed: int
+    points: int
+    """On a strand that is cut."""
+    terrain: Terrain | None = None
+    """None on a swatch."""
+    head: Head | None = None
+    middles: Mapping[str, Middles] = field(default_factory=dict)
+    """Of the clump operators, by name."""
+
+    def under(self, operator: str) -> Terrain:
+        """The terrain. Raises InputError on a swatch, which has none."""
+        if self.terrain is None:
+            raise InputError(
+                f'groom.style: the operator "{operator}" works on a head; groom.source = "swatch" has none'
+            )
+        return self.terrain
+
+    def values(self, option: float | Varied, hair: Hair) -> Vectors:
+        """What an option is at each strand (N,). Raises InputError for what has no value there."""
+        if not isinstance(option, Varied):
+            return np.full(len(hair), float(option))
+        if self.head is None or self.terrain is None:
+            raise InputError(f"groom.style: {option.told} varies over a scalp, and a swatch has none")
+        return varied(option, Scalp(self.seed, hair.index, hair.root, self.head, self.terrain))
+
+
+def tangential(v: NDArray[Any], n: Vectors) -> Vectors:
+    """Vectors (N, 3) without their part along unit normals n (N, 3)."""
+    return np.asarray(v - np.einsum("ij,ij->i", v, n)[:, None] * n)

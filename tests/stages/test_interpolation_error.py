@@ -1,0 +1,97 @@
+"""The report of the error that guides and interpolation make: its measures, its floors and who wins."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pipeline.validation.interpolation import Plan, Report, measure, merged
+from pipeline.validation.interpolation.grooms import HEAD, KINDS, LENGTH, groom, round_head
+from pipeline.validation.interpolation.measures import error
+from pipeline.validation.interpolation.methods import turns
+from tests.conftest import helix
+
+CURLY = next(kind for kind in KINDS if kind.name == "curly")
+
+
+@cache
+def report() -> Report:
+    plan = Plan((CURLY,), 120, (15, 60))
+    return merged(plan, [next(measure(plan))])
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_strands_of_every_kind_have_one_length_and_leave_the_head_alone(kind) -> None:
+    points = groom(kind, 60)
+    edge = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    depth = -round_head().distance(points.reshape(-1, 3)).min()
+    print(
+        f"lengths {edge.sum(axis=1).min():.4f} to {edge.sum(axis=1).max():.4f} m, depth {1000 * depth:.3f} mm"
+    )
+    assert edge.sum(axis=1) == pytest.approx(LENGTH, rel=4e-3)
+    assert np.ptp(edge, axis=1).max() < 1e-5 * edge.max()
+    assert depth < 0.05e-3
+    assert np.linalg.norm(points[:, 0], axis=1) == pytest.approx(HEAD, rel=1e-6)
+
+
+def test_measures_are_zero_for_the_truth_and_a_millimetre_for_hair_a_millimetre_aside() -> None:
+    rest = groom(CURLY, 20)
+    same, aside = (
+        error(CURLY, rest, rest[None], rest[None]),
+        error(CURLY, rest, rest[None] + [1e-3, 0, 0], rest[None]),
+    )
+    print(same, aside)
+    assert same.mean == same.worst == same.kink == same.radius == same.length == 0
+    assert (aside.mean, aside.p95, aside.worst) == pytest.approx([1e-3 / LENGTH] * 3)
+    assert abs(aside.kink) < 1e-6
+
+
+def test_the_radius_of_narrower_curls_is_seen() -> None:
+    wide = helix(CURLY.radius, CURLY.pitch, LENGTH, CURLY.points)[None]
+    narrow = wide * [1, 0.8, 0.8] + [0, 0.001, 0]
+    found = error(CURLY, wide, narrow[None], wide[None])
+    print(f"radius of curls of 4 mm against 5 mm: {found.radius:+.1%}")
+    assert found.radius == pytest.approx(-0.2, abs=1e-6)
+
+
+def test_turns_of_guides_are_what_turned_them() -> None:
+    rest = groom(CURLY, 5)
+    angle = np.linspace(0, 0.5, rest.shape[1] - 1)[:, None, None]
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.block([[c, 0 * c, s], [0 * c, 0 * c + 1, 0 * c], [-s, 0 * c, c]])
+    edge = np.einsum("pij,gpj->gpi", turn, np.diff(rest, axis=1))
+    moved = np.concatenate([rest[:, :1], rest[:, :1] + edge.cumsum(axis=1)], axis=1)
+    found = turns(rest, moved)
+    off = np.abs(np.einsum("gpij,gpj->gpi", found, np.diff(rest, axis=1)) - edge).max() / np.abs(edge).max()
+    print(f"segments turned by them are off by {off:.1e}, the turns by {np.abs(found - turn).max():.1e}")
+    assert off < 1e-3
+    assert np.abs(found - turn).max() < 0.05
+
+
+def test_tangent_rotation_errs_least_of_all_methods() -> None:
+    rows = report().find(choice="ours", guides=60)
+    print(", ".join(f"{row.method} {row.error.mean:.2%}, length {row.error.length:.1%}" for row in rows))
+    best = min(rows, key=lambda row: row.error.mean)
+    length = {row.method: row.error.length for row in rows}
+    assert len(rows) == 4
+    assert best.method == "tangent rotation"
+    assert length["tangent rotation"] < 1e-5
+    assert length["raw positions"] > 0.1
+
+
+def test_more_guides_and_chosen_ones_err_less() -> None:
+    ours, random = (
+        [row.error.mean for row in report().find(choice=choice, method="tangent rotation")]
+        for choice in ("ours", "random")
+    )
+    print(f"15 and 60 guides: ours {ours[0]:.2%}, {ours[1]:.2%}; random {random[0]:.2%}, {random[1]:.2%}")
+    assert ours[1] < ours[0]
+    assert (np.array(ours) < random).all()
+
+
+def test_without_hair_on_hair_guides_alone_move_as_among_all() -> None:
+    (floor,) = report().floors
+    print(f"moved {floor.moved:.1%}, tremor {floor.tremor:.1e}, alone {floor.alone:.1e}")
+    assert floor.moved > 0.05
+    assert floor.alone == 0
+    assert floor.tremor < 1e-5
