@@ -19,6 +19,7 @@ from pipeline.config.schema import Config
 from pipeline.errors import InputError
 from pipeline.groom.head import scalp
 from pipeline.groom.head_field import Field, distance_grid
+from pipeline.strands.chart import Chart
 
 Points = NDArray[np.floating[Any]]
 Feet = Callable[[Points], tuple[Points, Points]]
@@ -64,6 +65,20 @@ class Head:
     def fitted_field(self) -> Field:
         """Distance to the skin in fitted coordinates."""
         return self.field.rescaled(self.scale, self.offset)
+
+    @property
+    def fitted_chart(self) -> Chart:
+        """The chart of the scalp, in fitted coordinates."""
+        return scalp.chart()
+
+    @property
+    def chart(self) -> Chart:
+        """The chart of the scalp, world."""
+        return scalp.chart().placed(self.scale, self.offset)
+
+    def on_skin(self, uv: Points) -> NDArray[np.float64]:
+        """Points (N, 3) of the skin at chart points (N, 2), in fitted coordinates."""
+        return scalp.on_skin(self.fitted_field.distance, uv)
 
     def density(self, p: Points) -> Points:
         """Relative density of roots at fitted points on the skin."""
