@@ -1,4 +1,4 @@
-"""The combing of the scalp: which way hair flows along it, and how dense it stands beside partings.
+"""The combing of the scalp: which way hair flows along it, and how far partings are.
 
 Hair flows away from every parting, as charges do from a charged wire: with Q along the partings and D the distance
 from there,
@@ -26,7 +26,7 @@ from pipeline.strands.partings import Partings
 Points = NDArray[np.floating[Any]]
 Vectors = NDArray[np.float64]
 
-CELLS = 384  # nodes along a side of the grid: 1 mm of the scalp
+CELLS = 256  # nodes along a side of the grid: 1.5 mm of the scalp
 _RIM = 0.999  # chart radius beyond which nodes repeat it
 _STEP = 0.008  # of the chart: pieces of a parting, 1.6 mm
 _HEIGHTS = 0.3  # what heights count in D^2
@@ -41,12 +41,12 @@ _BLOCK = 8192
 
 @dataclass(frozen=True)
 class Combing:
-    """Flow and crowding over the scalp's chart, in fitted coordinates."""
+    """Flow and partings over the scalp's chart, in fitted coordinates."""
 
     chart: Chart
     grid: NDArray[np.float32]
-    """(U, V, 4): unit direction tangential to the skin, and density of roots (1 away from partings); node i, j is chart
-    point -1 + 2 (i, j) / (U - 1)."""
+    """(U, V, 4): unit direction tangential to the skin, and distance [m] from the nearest parting (1 without); node i, j is
+    chart point -1 + 2 (i, j) / (U - 1)."""
     segments: Vectors
     """(L, 2, 2): the partings, in the chart."""
 
@@ -57,6 +57,10 @@ class Combing:
 
     def crowding(self, points: Points) -> Vectors:
         """Density of roots (N,): more beside a parting, as hair flows away from it and none lies over it."""
+        return np.asarray(1 + _CROWDING * (1 - smoothstep(self.distance(points) / _CROWDED)), np.float64)
+
+    def distance(self, points: Points) -> Vectors:
+        """Distance (N,) [m] from the nearest parting, 1 without any."""
         return self._at(self.chart.uv(points))[:, 3]
 
     def standoff(self, roots: Points) -> Vectors:
@@ -105,37 +109,41 @@ def comb(head: Head, partings: Partings) -> Combing:
     uv *= np.minimum(1, _RIM / np.maximum(np.hypot(*uv.T), 1e-12))[:, None]
     points = head.on_skin(uv)
     normals = head.fitted_field.sample(points)[1]
-    crowding = np.ones(len(points))
+    apart = np.ones(len(points))
     if partings:
-        away, swirl, crowding = _from_partings(head, partings, points)
+        away, swirl, apart = _from_partings(head, partings, points)
     else:
         away, swirl = np.tile(-chart.axes[2], (len(points), 1)), np.full(len(points), _WHORL)
     away = _unit(_tangential(away, normals))
     c, s = np.cos(swirl)[:, None], np.sin(swirl)[:, None]
     flow = c * away + s * np.cross(normals, away)
-    grid = np.column_stack([flow, crowding]).astype(np.float32).reshape(CELLS, CELLS, 4)
+    grid = np.column_stack([flow, apart]).astype(np.float32).reshape(CELLS, CELLS, 4)
     return Combing(chart, grid, partings.segments)
 
 
 def _from_partings(head: Head, partings: Partings, points: Vectors) -> tuple[Vectors, Vectors, Vectors]:
-    """Directions away from all partings (N, 3), turns [rad] about their ends (N,) and crowding (N,)."""
+    """Directions away from all partings (N, 3), turns [rad] about their ends (N,) and distances [m] (N,)."""
     lines = [head.on_skin(refined(line, _STEP)) for line in partings.lines]
     pieces = [np.linalg.norm(np.diff(line, axis=0), axis=1) for line in lines]
     middle = np.concatenate([0.5 * (line[1:] + line[:-1]) for line in lines])
     ds = np.concatenate(pieces)
     ends = head.on_skin(_ends(partings.segments))
     ends = ends[head.density(ends) > 0]
+    flat = np.sqrt([1, _HEIGHTS, 1])
     away, swirl, nearest = np.empty_like(points), np.zeros(len(points)), np.empty(len(points))
     for first in range(0, len(points), _BLOCK):
         rows = slice(first, first + _BLOCK)
-        v = points[rows, None] - middle
-        squares = v * v
-        weight = ds / (squares @ np.array([1, _HEIGHTS, 1]) + _SOFT**2) ** 3
-        away[rows] = np.einsum("nq,nqi->ni", weight, v)
-        nearest[rows] = np.sqrt(squares.sum(axis=2).min(axis=1))
+        weight = ds / (_squares(points[rows] * flat, middle * flat) + _SOFT**2) ** 3
+        away[rows] = points[rows] * weight.sum(axis=1)[:, None] - weight @ middle
+        nearest[rows] = np.sqrt(_squares(points[rows], middle).min(axis=1))
     for end in ends:
         swirl += _SWIRL * np.exp(-((points - end) ** 2).sum(axis=1) / _SWIRLED**2)
-    return away, swirl, 1 + _CROWDING * (1 - smoothstep(nearest / _CROWDED))
+    return away, swirl, nearest
+
+
+def _squares(a: Vectors, b: Vectors) -> Vectors:
+    """Squared distances (N, M) of points (N, 3) from points (M, 3)."""
+    return np.asarray(np.maximum((a * a).sum(axis=1)[:, None] - 2 * a @ b.T + (b * b).sum(axis=1), 0))
 
 
 def _ends(segments: Vectors) -> Vectors:

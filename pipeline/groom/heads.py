@@ -7,13 +7,15 @@ hairline, parting and cut heights then hold on it. Grooming happens in these fit
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from dataclasses import field as default
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from pipeline import kernels
+from pipeline.body.distance import Grid
 from pipeline.body.normals import point_normals
 from pipeline.config.schema import Config
 from pipeline.errors import InputError
@@ -86,19 +88,24 @@ class Head:
 
     def uv(self, p: Points) -> Points:
         """Texture coordinates (N, 2), 0 to 1, of fitted points on the skin: the scalp chart."""
-        return np.asarray(0.5 + 0.5 * scalp.to_chart(p))
+        return np.asarray(0.5 + 0.5 * self.fitted_chart.uv(p))
 
     def array(self, name: str, p: Points) -> NDArray[np.float64]:
-        """A painted array at fitted points (N, 3), blended from the three nearest points of the skin.
+        """A painted array at fitted points (N, 3), linear in the triangle that is nearest to each.
 
         Raises InputError for an array that the mesh does not have.
         """
         if name not in self.arrays:
             there = f"it has {', '.join(self.arrays)}" if self.arrays else "it has none"
             raise InputError(f'scene.head: no painted array "{name}" on this mesh; {there}')
-        apart, near = cKDTree(self.skin.points).query(self.to_world(p), k=3)
-        weight = 1 / np.maximum(apart, 1e-9)
-        return np.asarray((self.arrays[name][near] * weight).sum(axis=1) / weight.sum(axis=1), np.float64)
+        triangle, weight = self._mesh.feet(np.ascontiguousarray(self.to_world(p), np.float64))
+        corner = self.skin.triangles[triangle]
+        return np.asarray((self.arrays[name][corner] * weight).sum(axis=1), np.float64)
+
+    @cached_property
+    def _mesh(self) -> kernels.MeshDistance:
+        grid = Grid.around(self.skin.points, self.field.spacing)
+        return grid.measure(self.skin.points, self.skin.triangles)
 
     def to_world(self, p: Points) -> Points:
         """Fitted coordinates to world coordinates."""

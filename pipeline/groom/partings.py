@@ -1,5 +1,6 @@
 """Partings of a config, as lines in the chart of the scalp."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ _FRONT, _BACK = 0.10, -0.045  # [m] ends of the line from the hairline to the cr
 _FADE_FROM, _FADE_OVER = -0.08, 0.09  # [m] off the middle it bends back to it towards the crown
 _CORNERS = 60
 _CHORD = 2e-3  # [m] longest piece of a line between corners that is taken for straight in the chart
+_FAR = 0.05  # [m] corners this far from the skin were meant for something else
 _ENDLESS = 100.0  # [m] half of the length of an offset's line where there is no head
 _COLUMNS = "a corner has 2 numbers (u and v of the chart) or 3 (x, y and z in metres)"
 
@@ -38,8 +40,7 @@ def partings_of(config: Config, head: Head | None) -> Partings:
     for name, line in zip(named, lines, strict=True):
         if not head.density(head.on_skin(refined(line, 0.01))).any():
             raise InputError(
-                f"groom.partings.{name}: no part of it lies on the scalp; points are in the coordinates of the "
-                "built-in head (y up, z forward, metres), whatever the size of the head"
+                f"groom.partings.{name}: no part of it lies where hair grows; move its corners onto the scalp"
             )
     return Partings(head.chart, lines)
 
@@ -47,7 +48,7 @@ def partings_of(config: Config, head: Head | None) -> Partings:
 def refined(line: Vectors, step: float) -> Vectors:
     """The polyline (N, D) with points between its corners, at most `step` apart."""
     pieces = [line[:1]]
-    for a, b in zip(line[:-1], line[1:], strict=True):
+    for a, b in pairwise(line):
         count = max(1, int(np.ceil(np.linalg.norm(b - a) / step)))
         pieces.append(a + np.linspace(0, 1, count + 1)[1:, None] * (b - a))
     return np.concatenate(pieces)
@@ -65,6 +66,13 @@ def _line(name: str, parting: Parting, head: Head) -> Vectors:
                 f"groom.partings.{name}: corner {row} lies outside of the chart; the scalp is where u^2 + v^2 < 0.81"
             )
         return corners
+    off = np.abs(head.fitted_field.distance(corners))
+    if (off > _FAR).any():
+        row = int(off.argmax())
+        raise InputError(
+            f"groom.partings.{name}: corner {row} lies {off[row]:.2g} m from the skin; points are in the coordinates of "
+            "the built-in head (y up, z forward, metres), whatever the size of the head"
+        )
     return head.fitted_chart.uv(refined(corners, _CHORD))
 
 

@@ -40,8 +40,8 @@ class Partings:
 
         Roots and targets are chart points. Raises ValueError for shapes or indices that do not fit.
         """
-        candidate = np.ascontiguousarray(candidate, np.int64)
-        return self._native.across(np.ascontiguousarray(roots), np.ascontiguousarray(targets), candidate)
+        ways: Indices = np.ascontiguousarray(candidate, np.int64)
+        return self._native.across(np.ascontiguousarray(roots), np.ascontiguousarray(targets), ways)
 
     @cached_property
     def segments(self) -> Vectors:
@@ -80,7 +80,8 @@ class Neighbours:
         They are those among the `count` nearest; where fewer than `enough` of them are on the point's side, the
         search goes on until there are `enough`, or all have been looked at. `NOBODY` fills up the rows.
         """
-        count, enough = min(count, len(self.points)), min(enough, count)
+        count = min(count, len(self.points))
+        enough = min(enough, count)
         found = self._nearest(points, count)
         if not self.partings:
             return found

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from pipeline.config.schema.base import Position, Section
 from pipeline.config.units import Length
 
+PartingName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 Ordinate = Annotated[float, Field(ge=-1, le=1)]
 
 

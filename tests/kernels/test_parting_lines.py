@@ -1,6 +1,7 @@
 """Partings: exact crossings, one side of a line for every root, and neighbours that none lies before."""
 
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -37,8 +38,9 @@ def test_crossings_are_those_of_exact_arithmetic() -> None:
             points = [[Fraction(v) for v in corner] for corner in line]
             wanted.append(
                 any(
-                    left_of(p, q, ends[0]) != left_of(p, q, ends[1]) and left_of(*ends, p) != left_of(*ends, q)
-                    for p, q in zip(points, points[1:], strict=False)
+                    left_of(p, q, ends[0]) != left_of(p, q, ends[1])
+                    and left_of(*ends, p) != left_of(*ends, q)
+                    for p, q in pairwise(points)
                 )
             )
         print(f"{found.sum()} of {len(a)} ways cross, {np.sum(found != wanted)} of them differ")
@@ -129,6 +131,8 @@ def test_the_chart_keeps_areas_and_comes_back() -> None:
     step = 1e-5
     du, dv = ((chart.rays(uv + step * e) - chart.rays(uv - step * e)) / (2 * step) for e in np.eye(2))
     area = np.linalg.norm(np.cross(du, dv), axis=1)
-    print(f"round trip {np.abs(back - uv).max():.1e}; area a unit of the chart {area.min():.6f} to {area.max():.6f}")
+    print(
+        f"round trip {np.abs(back - uv).max():.1e}; area a unit of the chart {area.min():.6f} to {area.max():.6f}"
+    )
     assert np.abs(back - uv).max() < 1e-12
     assert np.abs(area - 4).max() < 1e-6
