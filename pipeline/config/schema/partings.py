@@ -8,6 +8,7 @@ from pipeline.config.schema.base import Position, Section
 from pipeline.config.units import Length
 
 PartingName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+LINES = ("offset", "points", "chart", "file")  # where the line comes from
 Ordinate = Annotated[float, Field(ge=-1, le=1)]
 
 
@@ -29,7 +30,7 @@ class Parting(Section):
 
     @model_validator(mode="after")
     def _one_line(self) -> "Parting":
-        given = [name for name in ("offset", "points", "chart", "file") if getattr(self, name) is not None]
+        given = [name for name in LINES if getattr(self, name) is not None]
         if len(given) != 1:
             found = f"found {' and '.join(given)}" if given else "found none of them"
             raise ValueError(f"expected one of offset, points, chart and file; {found}")
