@@ -11,7 +11,9 @@ from pipeline.config.schema import Interpolate
 from pipeline.interpolate.bind import Groom, bind
 from pipeline.interpolate.copies import Roots
 from pipeline.interpolate.follow import GuideSet, shape_of
+from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding, Expansion, Style
+from pipeline.strands.partings import Neighbours, Partings
 from pipeline.strands.random import uniform
 
 Points = NDArray[np.float32]
@@ -19,6 +21,8 @@ Points = NDArray[np.float32]
 HEAD = 0.1  # radius [m]
 _LENGTH = 0.25
 _LAYER = 0.01  # height [m] at which hair lies on the head
+_ABOVE = Chart.from_above()
+_PARTED = np.array([[0.0, -1.0], [0.0, 1.0]])  # in that chart
 _GROOM = 20_000
 _GUIDES = 1_000
 _CHUNK = 16_384
@@ -59,12 +63,12 @@ def round_groom(strands: int, points: int, guides: int) -> tuple[Groom, Points]:
     """Wavy strands (S, P, 3) that grow from the upper half of a sphere, lie on it and hang, parted at x = 0."""
     root = HEAD * _upper_half(strands)
     rest = _combed(root, points, 2 * np.pi * uniform(1, np.arange(strands), 0))
-    side = np.where(root[:, 0] < 0, -1, 1).astype(np.int8)
     root = rest[:, 0].astype(np.float64)  # as a groom.h5 has it
     strand = np.arange(guides, dtype=np.uint32)
-    chosen = GuideSet(root[strand], shape_of(rest[strand]), side[strand], strand)
+    partings = Partings(_ABOVE, (_PARTED,))
+    chosen = GuideSet(Neighbours(root[strand], partings), shape_of(rest[strand]), strand)
     key = np.arange(strands, dtype=np.uint32)
-    return Groom(lambda a, b: rest[a:b], Roots(root, side, sphere()), key, chosen), rest
+    return Groom(lambda a, b: rest[a:b], Roots(root, partings, sphere()), key, chosen), rest
 
 
 def _combed(root: NDArray[np.float64], points: int, phase: NDArray[np.float64]) -> Points:

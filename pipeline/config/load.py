@@ -25,6 +25,7 @@ FILES: dict[
     ("scene", "head"): ("builtin", "none"),
     ("groom", "source"): ("procedural", "swatch"),
     ("groom", "pins"): (),
+    ("groom", "partings", "*", "file"): (),
     ("groom", "style", "*", "*", "map"): (),
     ("simulate", "motion", "file"): (),
     ("simulate", "tips_file"): (),

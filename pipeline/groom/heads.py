@@ -7,18 +7,21 @@ hairline, parting and cut heights then hold on it. Grooming happens in these fit
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from dataclasses import field as default
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from pipeline import kernels
+from pipeline.body.distance import Grid
 from pipeline.body.normals import point_normals
 from pipeline.config.schema import Config
 from pipeline.errors import InputError
 from pipeline.groom.head import scalp
 from pipeline.groom.head_field import Field, distance_grid
+from pipeline.strands.chart import Chart
 
 Points = NDArray[np.floating[Any]]
 Feet = Callable[[Points], tuple[Points, Points]]
@@ -65,25 +68,44 @@ class Head:
         """Distance to the skin in fitted coordinates."""
         return self.field.rescaled(self.scale, self.offset)
 
+    @property
+    def fitted_chart(self) -> Chart:
+        """The chart of the scalp, in fitted coordinates."""
+        return scalp.chart()
+
+    @property
+    def chart(self) -> Chart:
+        """The chart of the scalp, world."""
+        return scalp.chart().placed(self.scale, self.offset)
+
+    def on_skin(self, uv: Points) -> NDArray[np.float64]:
+        """Points (N, 3) of the skin at chart points (N, 2), in fitted coordinates."""
+        return scalp.on_skin(self.fitted_field.distance, uv)
+
     def density(self, p: Points) -> Points:
         """Relative density of roots at fitted points on the skin."""
         return scalp.density(p)
 
     def uv(self, p: Points) -> Points:
         """Texture coordinates (N, 2), 0 to 1, of fitted points on the skin: the scalp chart."""
-        return np.asarray(0.5 + 0.5 * scalp.to_chart(p))
+        return np.asarray(0.5 + 0.5 * self.fitted_chart.uv(p))
 
     def array(self, name: str, p: Points) -> NDArray[np.float64]:
-        """A painted array at fitted points (N, 3), blended from the three nearest points of the skin.
+        """A painted array at fitted points (N, 3), linear in the triangle that is nearest to each.
 
         Raises InputError for an array that the mesh does not have.
         """
         if name not in self.arrays:
             there = f"it has {', '.join(self.arrays)}" if self.arrays else "it has none"
             raise InputError(f'scene.head: no painted array "{name}" on this mesh; {there}')
-        apart, near = cKDTree(self.skin.points).query(self.to_world(p), k=3)
-        weight = 1 / np.maximum(apart, 1e-9)
-        return np.asarray((self.arrays[name][near] * weight).sum(axis=1) / weight.sum(axis=1), np.float64)
+        triangle, weight = self._mesh.feet(np.ascontiguousarray(self.to_world(p), np.float64))
+        corner = self.skin.triangles[triangle]
+        return np.asarray((self.arrays[name][corner] * weight).sum(axis=1), np.float64)
+
+    @cached_property
+    def _mesh(self) -> kernels.MeshDistance:
+        grid = Grid.around(self.skin.points, self.field.spacing)
+        return grid.measure(self.skin.points, self.skin.triangles)
 
     def to_world(self, p: Points) -> Points:
         """Fitted coordinates to world coordinates."""

@@ -139,6 +139,5 @@ def _strands(config: Config, points: Vectors, held: Pins, head: Head | None) -> 
         points=points.astype(np.float32),
         held=held,
         normal=normal.astype(np.float32),
-        side=np.zeros(len(points), np.int8),
         key=hashed(config.seed, np.arange(len(points)), _KEY),
     )

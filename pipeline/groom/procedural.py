@@ -14,14 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Config
+from pipeline.groom.combing import Combing, comb
 from pipeline.groom.heads import Head
-from pipeline.groom.partings import PartingLine
+from pipeline.groom.partings import partings_of
 from pipeline.groom.repairs import pushed_out
 from pipeline.groom.roots import place_roots
 from pipeline.groom.style.ground import Ground, Terrain, tangential
 from pipeline.groom.style.hair import LONGEST, Hair, bristles, unit
 from pipeline.groom.style.stack import CHUNK, Stack
 from pipeline.strands.held import held_ends
+from pipeline.strands.partings import Neighbours
 from pipeline.strands.random import hashed
 from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
@@ -39,14 +41,15 @@ class Style:
     def __init__(self, config: Config, head: Head) -> None:
         self.groom, self.seed, self.head = config.groom, config.seed, head
         skin = head.fitted_field
-        parting = PartingLine(self.groom.parting, skin) if self.groom.parting.enabled else None
-        self.terrain = Terrain(skin, skin.guarded(), parting)
-        density = partial(_density, head, parting)
+        self.partings = partings_of(config, head)
+        combing = comb(head, self.partings)
+        self.terrain = Terrain(skin, skin.guarded(), combing)
+        density = partial(_density, head, combing)
         found, _ = place_roots(self.groom.strands, self.seed, skin, density)
         self.roots, self.normals = (np.asarray(a, np.float64) for a in head.project(found))
-        self.side = self.terrain.side(self.roots)
+        placed = head.to_world(self.roots).astype(np.float32).astype(np.float64)  # as stages will see them
         ground = Ground(self.seed, self.groom.points, self.terrain, head)
-        self.stack = Stack(self.groom.style, ground, self._bristles, self.roots, self.side)
+        self.stack = Stack(self.groom.style, ground, self._bristles, Neighbours(placed, self.partings))
 
     def chunks(self) -> Iterator[Strands]:
         """All strands, in order; a few chunks are made at once, and no more are kept."""
@@ -68,7 +71,6 @@ class Style:
             points=self.head.to_world(points).astype(np.float32),
             held=held_ends(np.tile([2, 0], (len(index), 1)), self.groom.points),
             normal=self.normals[index].astype(np.float32),
-            side=self.side[index],
             key=hashed(self.seed, index, _KEY),
         )
 
@@ -78,7 +80,6 @@ class Style:
             index=index,
             root=root,
             normal=normal,
-            side=self.side[index],
             points=bristles(root, normal),
             length=np.full(len(index), LONGEST),
             comb=unit(tangential(np.broadcast_to([0.0, -1.0, 0.0], root.shape), normal)),
@@ -101,7 +102,6 @@ class Style:
         return points
 
 
-def _density(head: Head, parting: PartingLine | None, p: Vectors) -> Vectors:
+def _density(head: Head, combing: Combing, p: Vectors) -> Vectors:
     """Relative density of roots at points on the skin."""
-    crowding = parting.crowding(p) if parting else 1.0
-    return np.asarray(head.density(p) * crowding, np.float64)
+    return np.asarray(head.density(p) * combing.crowding(p), np.float64)

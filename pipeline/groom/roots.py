@@ -55,11 +55,9 @@ def _candidates(
 ) -> NDArray[np.float64]:
     uv = 2 * ((0.5 + index[:, None] * np.array([1 / _PLASTIC, 1 / _PLASTIC**2])) % 1) - 1
     inside = (uv**2).sum(1) < 1
-    index, ray = index[inside], scalp.rays(_DISC * uv[inside])
-    reach = np.full(len(ray), 0.16)
-    for _ in range(14):  # sphere tracing from outside
-        reach -= skin.distance(scalp.center() + reach[:, None] * ray)
-    p = scalp.center() + reach[:, None] * ray
-    cosine = np.maximum((skin.sample(p)[1] * ray).sum(1), 0.43)
-    kept = uniform(seed, index, _SALT) < density(p) * reach**2 / cosine / _HIGHEST
+    index, p = index[inside], scalp.on_skin(skin.distance, _DISC * uv[inside])
+    ray = p - scalp.chart().center
+    squares = (ray**2).sum(1)
+    cosine = np.maximum((skin.sample(p)[1] * ray).sum(1) / np.sqrt(squares), 0.43)
+    kept = uniform(seed, index, _SALT) < density(p) * squares / cosine / _HIGHEST
     return np.asarray(p[kept])

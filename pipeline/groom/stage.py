@@ -2,32 +2,37 @@
 
 strands/points (S, P, 3) f32 [m]   rest shapes in the head's rest pose, equal spacing; any prefix is a valid groom
 strands/normal (S, 3) f32          scalp normal at the root
-strands/side (S,) i8, key (S,) u32
+strands/key (S,) u32
 strands/held (S, P) u8             0 free, 1 held by the head, 2 by the hand
+partings/...                       lines of the scalp that hair does not blend across (see cache/partings.py)
 guides/strand (G,) u32             which strands are simulated, ascending
 guides/offset (G, P) f32 [m]       distance that their points keep from the skin
 head/points, triangles, normals, albedo, distance, origin, spacing     unless scene.head = "none"
 body/points (F, V, 3) f32 [m], pose (F, 4, 4)     the head in motion, where there is scene.body (see body.py)
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import cache
+from pipeline.cache.partings import write_partings
 from pipeline.config import Config, provenance
 from pipeline.config.schema import Contact
 from pipeline.groom.body import BodyFrame, body_frames
-from pipeline.groom.guides import choose_guides, looked_at
+from pipeline.groom.guides import choose_guides, looked_at, shut_in
 from pipeline.groom.head_field import Field
 from pipeline.groom.heads import Head, make_head
+from pipeline.groom.partings import partings_of
 from pipeline.groom.procedural import Style
 from pipeline.groom.swatch import swatch
 from pipeline.progress import say, track
 from pipeline.strands.held import read_held
+from pipeline.strands.partings import Partings
 from pipeline.strands.strands import Strands
 
 _HELD_UP = 0.8  # part of its groomed distance from the skin that a guide keeps
@@ -36,20 +41,24 @@ _HELD_UP = 0.8  # part of its groomed distance from the skin that a guide keeps
 def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
     """Make the groom of a config. Raises InputError for a head or a groom file that cannot serve."""
     head = make_head(config)
-    chunks, count, report = _source(config, head)
+    source = _source(config, head)
     with cache.create(experiment.groom, "groom", key, provenance(config, "groom")) as writer:
         if head is not None:
             _write_head(writer, head)
             _write_body(writer, body_frames(config, head))
-        points, side = _write_strands(writer, chunks, count, looked_at(config.groom.guides))
-        chosen = choose_guides(points, side, config.groom.guides)
+        write_partings(writer, source.partings)
+        points, roots = _write_strands(writer, source, looked_at(config.groom.guides))
+        chosen = choose_guides(points, config.groom.guides)
+        more = shut_in(chosen, roots, source.partings)
+        chosen = np.sort(np.concatenate([chosen, more]))
         writer.write("guides/strand", chosen)
-        writer.write(
-            "guides/offset",
-            contact_offset(config.simulate.contact, head.field if head else None, points[chosen]),
+        offset = contact_offset(
+            config.simulate.contact, head.field if head else None, _guide_points(source, points, chosen)
         )
-        writer.meta["report"] = {"strands": count, "guides": len(chosen)} | report
-    say("groom", f"{count} strands, {len(chosen)} guides")
+        writer.write("guides/offset", offset)
+        writer.meta["report"] = {"strands": source.count, "guides": len(chosen)} | source.report
+    added = f", {len(more)} of them for hair that partings shut off from all others" if len(more) else ""
+    say("groom", f"{source.count} strands, {len(chosen)} guides{added}")
 
 
 def contact_offset(contact: Contact, field: Field | None, guides: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -74,17 +83,31 @@ def contact_offset(contact: Contact, field: Field | None, guides: NDArray[np.flo
     return offset.astype(np.float32)
 
 
-def _source(config: Config, head: Head | None) -> tuple[Iterable[Strands], int, dict[str, object]]:
-    """The strands in chunks, their number, and what there is to report."""
-    if config.groom.source == "swatch":
-        return _pinned(config, [swatch(config)]), config.groom.strands, {}
+@dataclass(frozen=True)
+class Source:
+    """Where strands come from."""
+
+    chunks: Iterable[Strands]
+    count: int
+    partings: Partings
+    report: dict[str, object]
+    strand: Callable[[int], Strands]
+    """A single one of them."""
+
+
+def _source(config: Config, head: Head | None) -> Source:
     if config.groom.source == "procedural" and head is not None:
         style = Style(config, head)
-        return _pinned(config, style.chunks()), len(style.roots), {}
-    from pipeline.groom.imported import load
+        chunks = _pinned(config, style.chunks())
+        return Source(chunks, len(style.roots), style.partings, {}, lambda index: style.strands(index, 1))
+    if config.groom.source == "swatch":
+        strands, report = next(_pinned(config, [swatch(config)])), dict[str, Any]()
+    else:
+        from pipeline.groom.imported import load
 
-    strands, report = load(config, head)
-    return [strands], len(strands), report
+        strands, report = load(config, head)
+    partings = partings_of(config, head)
+    return Source([strands], len(strands), partings, report, lambda index: strands[index : index + 1])
 
 
 def _pinned(config: Config, chunks: Iterable[Strands]) -> Iterator[Strands]:
@@ -100,29 +123,36 @@ def _pinned(config: Config, chunks: Iterable[Strands]) -> Iterator[Strands]:
 
 
 def _write_strands(
-    writer: cache.Writer, chunks: Iterable[Strands], count: int, kept: int
-) -> tuple[NDArray[np.float32], NDArray[np.int8]]:
-    """Stream the strands to the file; returns points and sides of the first `kept`, to choose guides from."""
+    writer: cache.Writer, source: Source, kept: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Stream the strands to the file; returns points of the first `kept`, to choose guides from, and all roots."""
     columns: dict[str, cache.columns.ColumnWriter] = {}
     points: list[NDArray[np.float32]] = []
-    sides: list[NDArray[np.int8]] = []
-    with track("groom", count, "strand") as bar:
-        for strands in chunks:
+    roots: list[NDArray[np.float32]] = []
+    with track("groom", source.count, "strand") as bar:
+        for strands in source.chunks:
             columns = columns or _columns(writer, strands.points.shape[1])
             for name, column in columns.items():
                 column.append(getattr(strands, name))
             points.append(strands.points[:kept])
-            sides.append(strands.side[:kept])
+            roots.append(strands.points[:, 0].copy())
             kept -= len(points[-1])
             bar.advance(len(strands))
-    return np.concatenate(points), np.concatenate(sides)
+    return np.concatenate(points), np.concatenate(roots)
+
+
+def _guide_points(
+    source: Source, points: NDArray[np.float32], chosen: NDArray[np.uint32]
+) -> NDArray[np.float32]:
+    """Points (G, P, 3) of the guides; those beyond the first strands, of which all are kept, are made again."""
+    beyond = [source.strand(int(index)).points for index in chosen[chosen >= len(points)]]
+    return np.concatenate([points[chosen[chosen < len(points)]], *beyond])
 
 
 def _columns(writer: cache.Writer, points: int) -> dict[str, "cache.columns.ColumnWriter"]:
     layout: dict[str, tuple[tuple[int, ...], type]] = {
         "points": ((points, 3), np.float32),
         "normal": ((3,), np.float32),
-        "side": ((), np.int8),
         "key": ((), np.uint32),
         "held": ((points,), np.uint8),
     }

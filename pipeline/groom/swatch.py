@@ -4,10 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Config
+from pipeline.groom.partings import partings_of
 from pipeline.groom.style.ground import Ground
 from pipeline.groom.style.hair import Hair
 from pipeline.groom.style.stack import Stack
 from pipeline.strands.held import held_ends
+from pipeline.strands.partings import Neighbours
 from pipeline.strands.random import hashed
 from pipeline.strands.resample import resampled
 from pipeline.strands.strands import Strands
@@ -29,13 +31,13 @@ def swatch(config: Config) -> Strands:
         index=index,
         root=roots,
         normal=np.tile(direction, (len(index), 1)),
-        side=np.zeros(len(index), np.int8),
         points=roots[:, None] + np.linspace(0, groom.swatch.length, groom.points)[:, None] * direction,
         length=np.full(len(index), groom.swatch.length),
         comb=np.tile(across, (len(index), 1)),
     )
     ground = Ground(config.seed, groom.points)
-    stack = Stack(groom.style, ground, lambda some: _some(hair, some), roots, hair.side)
+    placed = Neighbours(roots.astype(np.float32).astype(np.float64), partings_of(config, None))
+    stack = Stack(groom.style, ground, lambda some: _some(hair, some), placed)
     points = stack.strands(index).points
     points[:, 0] = roots
     points = resampled(points, groom.points)
@@ -43,11 +45,10 @@ def swatch(config: Config) -> Strands:
         points=points.astype(np.float32),
         held=held_ends(np.tile([2, 2 if groom.swatch.pin_tips else 0], (len(index), 1)), groom.points),
         normal=hair.normal.astype(np.float32),
-        side=hair.side,
         key=hashed(config.seed, index, 7),
     )
 
 
 def _some(hair: Hair, index: NDArray[np.int64]) -> Hair:
-    names = ("index", "root", "normal", "side", "points", "length", "comb")
+    names = ("index", "root", "normal", "points", "length", "comb")
     return Hair(**{name: getattr(hair, name)[index] for name in names})

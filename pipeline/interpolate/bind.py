@@ -51,7 +51,6 @@ def _own(
     guide, weight = follow(
         groom.roots.root[index],
         shape_of(points),
-        groom.roots.side[index],
         groom.guides,
         interpolate.guides_per_strand,
     )
@@ -71,14 +70,15 @@ def _copies(
     groom: Groom, index: NDArray[np.int64], points: NDArray[np.float32], interpolate: Interpolate, seed: int
 ) -> Binding:
     parent = index % len(groom)
-    root = groom.roots.between(index, seed)
-    guide, weight = follow(
-        root, shape_of(points), groom.roots.side[parent], groom.guides, interpolate.guides_per_strand
-    )
+    root, shape, k = groom.roots.between(index, seed), shape_of(points), interpolate.guides_per_strand
+    guide, weight = follow(root.astype(np.float64), shape, groom.guides, k)
+    lost = np.flatnonzero(weight[:, 0] == 0)  # shut off from all guides, as its parent is not: it grows there
+    root[lost] = groom.roots.root[parent[lost]]
+    guide[lost], weight[lost] = follow(root[lost].astype(np.float64), shape[lost], groom.guides, k)
     varied = looks(index, interpolate.variation, seed)
     return Binding(
         parent=parent.astype(np.uint32),
-        root=root.astype(np.float32),
+        root=root,
         guide=guide,
         weight=weight,
         key=varied.key,

@@ -1,7 +1,7 @@
 """Copies: strands beyond the groom's count, with roots between the roots of the groom.
 
-Copy i takes the shape of groom strand i modulo the groom's count. The groom's every prefix is evenly spread, so
-every prefix of the copies is too.
+Copy i takes the shape of groom strand i modulo the groom's count, and grows near it, on the same side of all partings.
+The groom's every prefix is evenly spread, so every prefix of the copies is too.
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.config.schema import Variation
+from pipeline.strands.partings import NOBODY, Neighbours, Partings
 from pipeline.strands.random import hashed, normal, uniform
 
 Floats = NDArray[np.float64]
@@ -27,30 +28,39 @@ class Roots:
 
     root: Floats
     """(S, 3) [m]."""
-    side: NDArray[np.int8]
-    """(S,)."""
+    partings: Partings
     field: kernels.DistanceField | None
     """Distance to the head; None where there is no head."""
 
     @cached_property
     def neighbours(self) -> NDArray[np.intp]:
-        """(S, 6): the nearest roots of the same side, nearest first; repeated where there are fewer near by."""
-        from scipy.spatial import cKDTree
+        """(S, 6): the nearest roots that no parting lies before, nearest first; repeated where there are fewer near by."""
+        own = np.arange(len(self.root))[:, None]
+        if len(self.root) == 1:
+            return np.repeat(own, _NEIGHBOURS, axis=1)
+        near = Neighbours(self.root, self.partings).near(self.root, _NEIGHBOURS + 1, enough=2)
+        distance = np.linalg.norm(self.root[near] - self.root[:, None], axis=2)
+        distance[(near == NOBODY) | (near == own)] = np.inf
+        order = np.argsort(distance, axis=1, kind="stable")[:, : min(_NEIGHBOURS, len(self.root) - 1)]
+        near, distance = (np.take_along_axis(of, order, axis=1) for of in (near, distance))
+        near = np.where(distance > _FAR * distance[:, :1], near[:, :1], near)
+        near = np.where(np.isfinite(distance[:, :1]), near, own)
+        return near[:, np.arange(_NEIGHBOURS) % near.shape[1]]
 
-        near = np.repeat(np.arange(len(self.root))[:, None], _NEIGHBOURS, axis=1)
-        for side in np.unique(self.side):
-            rows = np.flatnonzero(self.side == side)
-            count = min(_NEIGHBOURS, len(rows) - 1)
-            if count:
-                distance, found = map(np.asarray, cKDTree(self.root[rows]).query(self.root[rows], count + 1))
-                far = distance > _FAR * distance[:, 1:2]
-                found = rows[np.where(far, found[:, 1:2], found)[:, 1:]]
-                near[rows] = found[:, np.arange(_NEIGHBOURS) % count]
-        return near
+    def between(self, index: NDArray[np.int64], seed: int) -> NDArray[np.float32]:
+        """Root (n, 3) [m] for each copy: in a triangle of its parent and two neighbours, its parent nearest.
 
-    def between(self, index: NDArray[np.int64], seed: int) -> Floats:
-        """Root (n, 3) float64 [m] for each copy: in a triangle of its parent and two neighbours, its parent nearest."""
+        Where a parting reaches between the parent and that place, the copy grows where its parent does.
+        """
         parent = index % len(self.root)
+        root = self._in_triangle(index, parent, seed).astype(np.float32)
+        if self.partings:
+            uv, own = (self.partings.chart.uv(of) for of in (root, self.root[parent]))
+            across = self.partings.across(uv, own, np.arange(len(uv))[:, None])
+            root = np.where(across, self.root[parent].astype(np.float32), root)
+        return root
+
+    def _in_triangle(self, index: NDArray[np.int64], parent: NDArray[np.int64], seed: int) -> Floats:
         corners = [parent] + [
             self.neighbours[parent, (uniform(seed, index, salt) * _NEIGHBOURS).astype(int)]
             for salt in (_FIRST, _SECOND)

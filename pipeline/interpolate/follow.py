@@ -1,18 +1,15 @@
-"""Which guides a strand follows: few, near, of the same side of the parting and of similar shape.
+"""Which guides a strand follows: few, near, of similar shape, and none that a parting lies before.
 
 Notation: d distance of the roots, D differences of the shapes; a guide's cost is c^2 = (d / 10 mm)^2 + sum (D / 30 mm)^2,
 its weight a Gaussian of c. On a groom of 11,400 strands similarity saves a third of the error, or half of the guides.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
+from pipeline.strands.partings import NOBODY, Neighbours
 
 Floats = NDArray[np.float64]
 
@@ -34,62 +31,36 @@ def shape_of(points: NDArray[np.float32]) -> Floats:
 
 @dataclass(frozen=True)
 class GuideSet:
-    """The guides at rest, to be looked up by root, side and shape."""
+    """The guides at rest, to be looked up by root and shape."""
 
-    root: Floats
-    """(G, 3) [m]."""
+    roots: Neighbours
+    """G roots [m], and the partings between them."""
     shape: Floats
     """(G, 9), see `shape_of`."""
-    side: NDArray[np.int8]
-    """(G,)."""
     strand: NDArray[np.uint32]
     """(G,): the groom strand that the guide is, ascending."""
 
-    @cached_property
-    def sides(self) -> dict[int, tuple[NDArray[np.intp], "cKDTree"]]:
-        """The guides of each side and a tree of their roots."""
-        from scipy.spatial import cKDTree
-
-        found = {int(side): np.flatnonzero(self.side == side) for side in np.unique(self.side)}
-        return {side: (guides, cKDTree(self.root[guides])) for side, guides in found.items()}
-
-    @cached_property
-    def everywhere(self) -> tuple[NDArray[np.intp], "cKDTree"]:
-        """All guides, for strands of a side that has none."""
-        from scipy.spatial import cKDTree
-
-        return np.arange(len(self.root)), cKDTree(self.root)
-
 
 def follow(
-    root: Floats, shape: Floats, side: NDArray[np.int8], guides: GuideSet, k: int
+    root: Floats, shape: Floats, guides: GuideSet, k: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
     """Choose k guides for each strand.
 
-    A strand of a side without guides follows those of the others; where a side has fewer than k, the rest has
-    weight 0.
+    Where fewer than k are on a strand's side of all partings, the rest has weight 0.
 
     Args:
         root: (n, 3) float64 [m], in the head's rest pose.
         shape: (n, 9), see `shape_of`.
-        side: (n,) side of the parting.
         guides: where to choose from.
         k: how many.
 
     Returns:
-        guide (n, k) uint32 and weight (n, k) float32, greatest first, of sum 1.
+        guide (n, k) uint32 and weight (n, k) float32, greatest first, of sum 1; all 0 for a strand that partings shut
+        off from all guides.
 
     """
-    guide = np.zeros((len(root), k), np.uint32)
-    weight = np.zeros((len(root), k), np.float32)
-    for label in np.unique(side):
-        rows = np.flatnonzero(side == label)
-        members, tree = guides.sides.get(int(label), guides.everywhere)
-        count = min(CANDIDATES, len(members))
-        _, near = tree.query(root[rows], count)
-        candidate = members[near.reshape(len(rows), count)]
-        guide[rows], weight[rows] = _best(root[rows], shape[rows], candidate, guides, k)
-    return guide, weight
+    candidate = guides.roots.near(root, CANDIDATES, enough=k + 1)
+    return _best(root, shape, candidate, guides, k)
 
 
 def follow_itself(
@@ -105,28 +76,29 @@ def follow_itself(
 def _best(
     root: Floats, shape: Floats, candidate: NDArray[np.intp], guides: GuideSet, k: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
-    apart = (guides.root[candidate] - root[:, None]) / _ROOT_SCALE
+    there = candidate != NOBODY
+    apart = (guides.roots.points[candidate] - root[:, None]) / _ROOT_SCALE
     unlike = guides.shape[candidate] - shape[:, None]
-    cost = (apart**2).sum(axis=2) + (unlike**2).sum(axis=2)
+    cost = np.where(there, (apart**2).sum(axis=2) + (unlike**2).sum(axis=2), np.inf)
     order = np.argsort(cost, axis=1, kind="stable")
     cost = np.take_along_axis(cost, order, axis=1)
     guide = np.take_along_axis(candidate, order, axis=1)
     taken = min(k, guide.shape[1])
     weight = _weights(cost, taken)
+    guide = np.where(guide == NOBODY, guide[:, :1], guide)[:, :taken].clip(min=0)
     missing = ((0, 0), (0, k - taken))
-    return (
-        np.pad(guide[:, :taken], missing, mode="edge").astype(np.uint32),
-        np.pad(weight, missing).astype(np.float32),
-    )
+    return np.pad(guide, missing, mode="edge").astype(np.uint32), np.pad(weight, missing).astype(np.float32)
 
 
 def _weights(cost: Floats, k: int) -> Floats:
     """Gaussian as wide as the mean of the k costs, which falls to 0 where the next guide would take the place.
 
-    Without that fall neighbouring strands would part visibly where their k-th guides change.
+    Without that fall neighbouring strands would part visibly where their k-th guides change. Infinite costs weigh 0.
     """
-    best = cost[:, :k]
-    weight = np.exp(-best / (best.mean(axis=1, keepdims=True) + 1e-12))
+    best, there = cost[:, :k], np.isfinite(cost)
+    count = np.maximum(there[:, :k].sum(axis=1, keepdims=True), 1)
+    known = np.where(there[:, :k], best, 0)
+    weight = np.where(there[:, :k], np.exp(-known / (known.sum(axis=1, keepdims=True) / count + 1e-12)), 0)
     if cost.shape[1] > k:
-        weight *= 1.001 - best / (cost[:, k : k + 1] + 1e-12)
-    return np.asarray(weight / weight.sum(axis=1, keepdims=True))
+        weight *= 1.001 - known / (cost[:, k : k + 1] + 1e-12)
+    return np.asarray(weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300))

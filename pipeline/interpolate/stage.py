@@ -11,12 +11,14 @@ import numpy as np
 
 from pipeline import cache
 from pipeline.cache.expansion import distance_field
+from pipeline.cache.partings import read_partings
 from pipeline.config import Config, provenance
 from pipeline.interpolate.bind import CHUNK, Groom, bind
 from pipeline.interpolate.copies import Roots
 from pipeline.interpolate.follow import GuideSet, shape_of
 from pipeline.progress import say
 from pipeline.strands.expand import Binding
+from pipeline.strands.partings import Neighbours
 
 
 def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
@@ -42,13 +44,15 @@ def read_groom(reader: cache.Reader) -> Groom:
     """What binding needs of an open groom.h5; its points stay in the file."""
     points = reader["strands/points"]
     root = np.concatenate([points[a : a + CHUNK][:, 0] for a in range(0, points.shape[0], CHUNK)])
-    side, strand = reader["strands/side"][:], reader["guides/strand"][:]
+    strand, partings = reader["guides/strand"][:], read_partings(reader)
     guides = GuideSet(
-        root=root[strand].astype(np.float64), shape=shape_of(points[strand]), side=side[strand], strand=strand
+        roots=Neighbours(root[strand].astype(np.float64), partings),
+        shape=shape_of(points[strand]),
+        strand=strand,
     )
     return Groom(
         rows=lambda a, b: points[a:b],
-        roots=Roots(root.astype(np.float64), side, distance_field(reader)),
+        roots=Roots(root.astype(np.float64), partings, distance_field(reader)),
         key=reader["strands/key"][:],
         guides=guides,
     )

@@ -222,6 +222,20 @@ class DistanceField:
 def distance(field: DistanceField, points: _F64) -> tuple[_F64, _F64]:
     """Signed distance (N,) [m] and unit outward normal (N, 3) at points (N, 3) float64 [m] of the head's rest frame."""
 
+class PartingLines:
+    """Partings as segments of the scalp's chart, and whether ways between roots cross them (partings.hpp)."""
+
+    def __init__(self, segments: _F64) -> None:
+        """Segments (L, 2, 2) float64, both ends of each; raises ValueError for points that are not finite."""
+
+    def across(self, roots: _F64, targets: _F64, candidate: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether the straight way from each root (N, 2) to its candidates (N, K), rows of targets (M, 2), crosses one.
+
+        Raises:
+            ValueError: another number of rows, a candidate that is no target.
+
+        """
+
 class MeshDistance:
     """Signed distance from the nodes of a grid to a closed mesh, negative inside (mesh_distance.hpp).
 

@@ -21,14 +21,12 @@ class Strands:
     """(S, P): 0 free, 1 held by the head, 2 held by the hand; two held points at the root are a clamp."""
     normal: NDArray[np.float32]
     """(S, 3): unit normal of the scalp at the root."""
-    side: NDArray[np.int8]
-    """(S,): on which side of the parting the root lies."""
     key: NDArray[np.uint32]
     """(S,): random key, derived from seed and strand."""
 
     def __post_init__(self) -> None:
         count = len(self.points)
-        shapes = {"held": self.points.shape[:2], "normal": (count, 3), "side": (count,), "key": (count,)}
+        shapes = {"held": self.points.shape[:2], "normal": (count, 3), "key": (count,)}
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise InputError(f"strands: {name} has shape {getattr(self, name).shape}, expected {shape}")
@@ -42,6 +40,10 @@ class Strands:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def __getitem__(self, rows: slice) -> "Strands":
+        """A part of the strands."""
+        return Strands(self.points[rows], self.held[rows], self.normal[rows], self.key[rows])
 
     @property
     def length(self) -> NDArray[np.float32]:

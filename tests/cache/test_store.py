@@ -16,7 +16,7 @@ def write_groom(path: Path, strands: int = 500) -> np.ndarray:
     points = np.random.default_rng(3).normal(size=(strands, 16, 3)).astype(np.float32)
     with cache.create(path, kind="groom", key="k1", provenance={"seed": 3}) as writer:
         writer.write("strands/points", points, chunk_rows=64)
-        writer.write("strands/side", np.arange(strands, dtype=np.int8) % 2)
+        writer.write("strands/tip", np.arange(strands, dtype=np.int8) % 2)
         writer.meta["report"] = {"repaired": [1, 5]}
     return points
 

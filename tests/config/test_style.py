@@ -195,3 +195,18 @@ def test_a_formula_may_use_every_variable_and_function() -> None:
     ]
     for text in (" + ".join(VARIABLES), *calls, "-x ** 2 / (1 + y)"):
         parse(text)
+
+
+def test_a_parting_is_moved_by_its_name_or_replaced_by_another_line(tmp_path: Path) -> None:
+    """A line of another kind takes the place of the whole parting."""
+    write(tmp_path, "base.toml", '[groom.partings.main]\noffset = "1 cm"\nenabled = false\n')
+    (tmp_path / "line.csv").write_text("0,0\n0,0.5")
+    for text in ('offset = "2 cm"', "chart = [[0, 0], [0, 0.5]]", 'file = "line.csv"'):
+        main = loaded(
+            tmp_path, f'extends = "base.toml"\n[groom.partings.main]\n{text}\n'
+        ).config.groom.partings
+        print(text, "->", main["main"])
+        assert main["main"].offset == (0.02 if "offset" in text else None)
+        assert (main["main"].chart is not None) == ("chart" in text)
+    assert main["main"].file == str(tmp_path / "line.csv")
+    assert main["main"].enabled

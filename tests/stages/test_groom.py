@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline import cache
-from pipeline.config.schema import Config, Contact, Curl, Groom, Parting, Scene, Swatch
+from pipeline.config.schema import Config, Contact, Curl, Groom, Scene, Swatch
 from pipeline.groom import stage
 from pipeline.groom.head.distance import distance
 from pipeline.groom.heads import Head
@@ -21,7 +21,7 @@ from pipeline.strands.random import normal, uniform
 from pipeline.strands.strands import Strands
 from tests.stages.conftest import shipped
 
-COLUMNS = ("points", "held", "normal", "side", "key")
+COLUMNS = ("points", "held", "normal", "key")
 
 
 def unequal(points: NDArray[Any]) -> float:
@@ -123,25 +123,14 @@ def test_roots_follow_the_wanted_density(mannequin: Head) -> None:
 
 
 def test_hair_parts_and_stays_parted(wavy: Strands) -> None:
-    left = wavy.side > 0
+    left = wavy.points[:, 0, 0] > 0
     top = wavy.points[:, 0, 1] > 0.09
-    kept = np.sign(wavy.points[top, -1, 0]) == wavy.side[top]
+    kept = np.sign(wavy.points[top, -1, 0]) == np.sign(wavy.points[top, 0, 0])
     print(
         f"left {left.mean():.2f}; of {top.sum()} strands from the top {kept.mean():.3f} end on their own side"
     )
     assert 0.4 < left.mean() < 0.6
-    assert np.array_equal(left, wavy.points[:, 0, 0] > 0)
     assert kept.mean() > 0.9
-
-
-def test_a_parting_moves_sideways_and_can_be_switched_off(mannequin: Head) -> None:
-    def sides(parting: Parting) -> NDArray[np.int8]:
-        return Style(Config(name="p", groom=Groom(strands=500, parting=parting)), mannequin).side
-
-    aside = (sides(Parting(offset=0.03)) > 0).mean()
-    print(f"roots to the left of a parting 3 cm to the left: {aside:.2f}")
-    assert 0.1 < aside < 0.45
-    assert (sides(Parting(enabled=False)) == 0).all()
 
 
 def test_random_numbers_are_uniform_and_apart() -> None:

@@ -12,6 +12,8 @@ from pipeline import cache
 from pipeline.config.schema import Config, Groom, Scene, Swatch
 from pipeline.groom import stage
 from pipeline.groom.guides import choose_guides, looked_at
+from pipeline.strands.chart import Chart
+from pipeline.strands.partings import Partings
 from pipeline.strands.strands import Strands
 
 
@@ -19,8 +21,9 @@ def error_of(strands: Strands, guides: NDArray[np.integer]) -> float:
     """Mean distance [m] of points when each strand takes the shape of the guide whose root is nearest on its side."""
     shape = strands.points - strands.points[:, :1]
     total = 0.0
-    for side in (-1, 1):
-        own, ours = strands.side == side, guides[strands.side[guides] == side]
+    side = np.sign(strands.points[:, 0, 0])
+    for which in (-1, 1):
+        own, ours = side == which, guides[side[guides] == which]
         nearest = ours[cKDTree(strands.points[ours, 0]).query(strands.points[own, 0])[1]]
         total += np.linalg.norm(shape[own] - shape[nearest], axis=2).mean(axis=1).sum()
     return total / len(strands)
@@ -28,7 +31,7 @@ def error_of(strands: Strands, guides: NDArray[np.integer]) -> float:
 
 def test_guides_reconstruct_a_groom_better_than_random_ones(wavy: Strands) -> None:
     count = 300
-    chosen = error_of(wavy, choose_guides(wavy.points, wavy.side, count))
+    chosen = error_of(wavy, choose_guides(wavy.points, count))
     by_chance = [error_of(wavy, np.random.default_rng(k).permutation(len(wavy))[:count]) for k in range(5)]
     prefix = error_of(wavy, np.arange(count))
     print(
@@ -40,14 +43,14 @@ def test_guides_reconstruct_a_groom_better_than_random_ones(wavy: Strands) -> No
 
 
 def test_more_guides_reconstruct_better(wavy: Strands) -> None:
-    errors = [error_of(wavy, choose_guides(wavy.points, wavy.side, count)) for count in (50, 200, 800)]
+    errors = [error_of(wavy, choose_guides(wavy.points, count)) for count in (50, 200, 800)]
     print("50, 200, 800 guides: " + ", ".join(f"{1000 * error:.2f} mm" for error in errors))
     assert errors[0] > errors[1] > errors[2]
 
 
 @pytest.mark.parametrize("count", [1, 2, 77, 4999, 5000, 6000])
 def test_guides_are_as_many_different_strands_as_wanted(wavy: Strands, count: int) -> None:
-    chosen = choose_guides(wavy.points, wavy.side, count)
+    chosen = choose_guides(wavy.points, count)
     print(f"{count} wanted: {len(chosen)}")
     assert chosen.dtype == np.uint32
     assert len(chosen) == min(count, len(wavy))
@@ -57,19 +60,19 @@ def test_guides_are_as_many_different_strands_as_wanted(wavy: Strands, count: in
 
 def test_guides_of_strands_that_are_all_alike_are_still_different(straight: NDArray[np.float64]) -> None:
     points = np.tile(straight.astype(np.float32), (100, 1, 1))
-    chosen = choose_guides(points, np.zeros(100, np.int8), 30)
+    chosen = choose_guides(points, 30)
     assert len(np.unique(chosen)) == 30
 
 
 def test_only_a_prefix_is_looked_at(wavy: Strands, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pipeline.groom.guides._PREFIX", 1000)
-    few = choose_guides(wavy.points[: looked_at(100)], wavy.side[: looked_at(100)], 100)
+    few = choose_guides(wavy.points[: looked_at(100)], 100)
     print(f"looked at {looked_at(100)} of {len(wavy)} strands")
-    assert np.array_equal(few, choose_guides(wavy.points, wavy.side, 100))
+    assert np.array_equal(few, choose_guides(wavy.points, 100))
 
 
 def test_both_sides_of_the_parting_have_guides(wavy: Strands) -> None:
-    side = wavy.side[choose_guides(wavy.points, wavy.side, 200)]
+    side = wavy.points[choose_guides(wavy.points, 200), 0, 0]
     print(f"200 guides: {(side > 0).sum()} left, {(side < 0).sum()} right")
     assert min((side > 0).sum(), (side < 0).sum()) > 70
 
@@ -82,7 +85,11 @@ def test_memory_does_not_grow_with_the_count(tmp_path: Path, monkeypatch: pytest
     chunk = stage.swatch(config)
 
     def peak(chunks: int) -> int:
-        monkeypatch.setattr(stage, "_source", lambda *_: ((chunk for _ in range(chunks)), 1000 * chunks, {}))
+        unparted = Partings(Chart.from_above())
+        source = stage.Source(
+            (chunk for _ in range(chunks)), 1000 * chunks, unparted, {}, lambda _: chunk[:1]
+        )
+        monkeypatch.setattr(stage, "_source", lambda *_: source)
         tracemalloc.start()
         stage.execute(config, cache.Experiment(tmp_path / str(chunks)), "key")
         found = tracemalloc.get_traced_memory()[1]

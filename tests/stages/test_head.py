@@ -111,19 +111,6 @@ def test_density_is_zero_on_the_face_and_one_on_the_crown() -> None:
     assert (found[1:] == 0).all()
 
 
-def test_the_chart_keeps_areas_and_leads_back() -> None:
-    uv = np.random.default_rng(4).uniform(-0.6, 0.6, (500, 2))
-    back = scalp.to_chart(scalp.center() + 0.1 * scalp.rays(uv))
-    eps = 1e-5
-    u, v = (scalp.rays(uv + eps * np.eye(2)[k]) - scalp.rays(uv - eps * np.eye(2)[k]) for k in range(2))
-    area = np.linalg.norm(np.cross(u, v), axis=1) / (2 * eps) ** 2
-    print(
-        f"there and back {np.abs(back - uv).max():.1e}; area per chart area {area.min():.6f} to {area.max():.6f}"
-    )
-    assert np.abs(back - uv).max() < 1e-12
-    assert np.ptp(area) < 1e-6
-
-
 def test_there_is_no_head_when_none_is_wanted() -> None:
     config = Config(name="none", scene=Scene(head="none"), groom=Groom(source="swatch"))
     assert make_head(config) is None

@@ -312,7 +312,7 @@ def test_hair_grows_on_real_heads(name: str) -> None:
     assert roots.max() < 3e-4
     assert (d < 0).mean() < 5e-4  # where a bust ends in a sharp edge, both its sides push
     assert d.min() > -4e-3
-    assert 0.35 < (strands.side > 0).mean() < 0.65
+    assert 0.35 < (strands.points[:, 0, 0] > 0).mean() < 0.65
 
 
 @pytest.mark.parametrize("name", HEADS)

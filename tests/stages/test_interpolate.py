@@ -10,16 +10,20 @@ from numpy.typing import NDArray
 from pipeline import cache, kernels
 from pipeline.bench.interpolate import HEAD, round_groom, sphere, swung, whole
 from pipeline.cache.expansion import expansion_from
+from pipeline.cache.partings import write_partings
 from pipeline.config.schema import Config, Interpolate
 from pipeline.interpolate import bind as bind_module
 from pipeline.interpolate import stage
 from pipeline.interpolate.copies import Roots
 from pipeline.interpolate.follow import GuideSet, follow, shape_of
+from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding
+from pipeline.strands.partings import Neighbours, Partings
 
 STRANDS, POINTS, GUIDES = 900, 32, 80
 GROOM, REST = round_groom(STRANDS, POINTS, GUIDES)
 COUNT = 2500
+UNPARTED = Partings(Chart.from_above())
 BINDING = whole(GROOM, Interpolate(strands=COUNT), seed=9)
 
 
@@ -28,8 +32,9 @@ def columns(binding: Binding) -> dict[str, NDArray[np.generic]]:
 
 
 def test_no_strand_follows_a_guide_across_the_parting() -> None:
-    side = GROOM.roots.side[BINDING.parent]
-    crossing = (GROOM.guides.side[BINDING.guide] != side[:, None]) & (BINDING.weight > 0)
+    crossing = (np.sign(GROOM.guides.roots.points[BINDING.guide, 0]) != np.sign(BINDING.root[:, :1])) & (
+        BINDING.weight > 0
+    )
     close = (np.abs(BINDING.root[:, 0]) < 5e-3).sum()
     print(f"{crossing.sum()} crossings; {close} strands grow within 5 mm of the parting")
     assert close > 20
@@ -54,8 +59,8 @@ def test_similar_guides_come_before_nearer_ones(straight: NDArray[np.float64]) -
     """Of two guides as near, the one of the strand's own shape is preferred; nearness alone does not decide."""
     shapes = np.stack([straight, straight[:, [1, 0, 2]], straight]).astype(np.float32)
     root = np.array([[0, 0, 0.000], [0, 0, 0.004], [0, 0, 0.008]])
-    guides = GuideSet(root[:2], shape_of(shapes[:2]), np.zeros(2, np.int8), np.arange(2, dtype=np.uint32))
-    guide, weight = follow(root[2:], shape_of(shapes[2:]), np.zeros(1, np.int8), guides, 2)
+    guides = GuideSet(Neighbours(root[:2], UNPARTED), shape_of(shapes[:2]), np.arange(2, dtype=np.uint32))
+    guide, weight = follow(root[2:], shape_of(shapes[2:]), guides, 2)
     print(f"nearer but unlike: {weight[0, 1]:.1e}, farther but alike: {weight[0, 0]:.3f}")
     assert guide[0].tolist() == [0, 1]
     assert weight[0, 0] > 0.7
@@ -65,9 +70,9 @@ def test_weights_change_smoothly_from_strand_to_strand(straight: NDArray[np.floa
     """Where the set of guides changes, the one that leaves has no weight left."""
     roots = np.random.default_rng(2).uniform(0, 0.05, (60, 3)) * [1, 1, 0]
     shape = shape_of(straight[None].astype(np.float32))
-    guides = GuideSet(roots, shape.repeat(60, 0), np.zeros(60, np.int8), np.arange(60, dtype=np.uint32))
+    guides = GuideSet(Neighbours(roots, UNPARTED), shape.repeat(60, 0), np.arange(60, dtype=np.uint32))
     path = np.linspace([0.01, 0.01, 0], [0.04, 0.03, 0], 2000)
-    guide, weight = follow(path, shape.repeat(2000, 0), np.zeros(2000, np.int8), guides, 3)
+    guide, weight = follow(path, shape.repeat(2000, 0), guides, 3)
     dense = np.zeros((2000, 60))
     np.put_along_axis(dense, guide.astype(np.intp), weight.astype(np.float64), axis=1)
     step = np.abs(np.diff(dense, axis=0)).max()
@@ -76,17 +81,25 @@ def test_weights_change_smoothly_from_strand_to_strand(straight: NDArray[np.floa
     assert len(np.unique(guide)) > 8
 
 
-def test_a_side_without_guides_follows_the_others() -> None:
-    guide, weight = follow(GROOM.roots.root[:5], shape_of(REST[:5]), np.full(5, 7, np.int8), GROOM.guides, 3)
-    assert np.isfinite(weight).all()
-    assert (guide < GUIDES).all()
+def test_who_is_shut_off_from_all_guides_has_no_weights() -> None:
+    """Roots right of the parting, guides to its left; one guide on its own side is enough."""
+    right = GROOM.roots.root[GROOM.roots.root[:, 0] > 0.01][:5]
+    points = GROOM.guides.roots.points.copy()
+    points[:, 0] = -np.abs(points[:, 0]) - 1e-3
+    for moved, weights in ((None, 0), (7, 1)):
+        if moved is not None:
+            points[moved, 0] *= -1
+        guides = GuideSet(Neighbours(points, GROOM.roots.partings), GROOM.guides.shape, GROOM.guides.strand)
+        guide, weight = follow(right, shape_of(REST[:5]), guides, 3)
+        print(f"weights {weight[0]}, guides {guide[0]}")
+        assert (weight == [weights, 0, 0]).all()
+    assert (guide[:, 0] == 7).all()
 
 
 def test_fewer_guides_than_asked_for_leave_the_rest_without_weight() -> None:
-    one = GuideSet(
-        GROOM.guides.root[:1], GROOM.guides.shape[:1], np.zeros(1, np.int8), np.zeros(1, np.uint32)
-    )
-    guide, weight = follow(GROOM.roots.root[:5], shape_of(REST[:5]), np.zeros(5, np.int8), one, 4)
+    root = Neighbours(GROOM.guides.roots.points[:1], UNPARTED)
+    one = GuideSet(root, GROOM.guides.shape[:1], np.zeros(1, np.uint32))
+    guide, weight = follow(GROOM.roots.root[:5], shape_of(REST[:5]), one, 4)
     assert not guide.any()
     assert (weight == [1, 0, 0, 0]).all()
 
@@ -108,7 +121,7 @@ def test_copies_grow_on_the_skin_between_their_neighbours() -> None:
     copies = slice(STRANDS, None)
     height = np.abs(np.linalg.norm(BINDING.root[copies], axis=1) - HEAD).max()
     apart = np.linalg.norm(BINDING.root[copies] - REST[BINDING.parent[copies], 0], axis=1)
-    across = np.sign(BINDING.root[copies, 0]) != GROOM.roots.side[BINDING.parent[copies]]
+    across = np.sign(BINDING.root[copies, 0]) != np.sign(GROOM.roots.root[BINDING.parent[copies], 0])
     between = np.linalg.norm(REST[GROOM.roots.neighbours, 0] - REST[:, None, 0], axis=2).max(axis=1)
     print(
         f"off the skin by {height * 1e3:.3f} mm; {apart.mean() * 1e3:.2f} mm from parents; {across.sum()} cross"
@@ -134,7 +147,7 @@ def test_far_neighbours_are_left_out() -> None:
     """Two patches of hair: copies stay in theirs."""
     patch = np.random.default_rng(1).uniform(0, 0.01, (8, 3)) * [1, 1, 0]
     lonely = np.concatenate([patch, patch[:3] + np.array([0.5, 0, 0])])
-    root = Roots(lonely, np.zeros(11, np.int8), None).between(np.arange(11, 2000), seed=1)
+    root = Roots(lonely, UNPARTED, None).between(np.arange(11, 2000), seed=1)
     outside = ((root[:, 0] > 0.02) & (root[:, 0] < 0.49)).sum()
     print(f"{outside} roots between the patches")
     assert outside == 0
@@ -154,7 +167,7 @@ def written_groom(folder: Path, head: bool) -> cache.Experiment:
     experiment = cache.Experiment(folder)
     with cache.create(experiment.groom, kind="groom", key="groom") as writer:
         writer.write("strands/points", REST)
-        writer.write("strands/side", GROOM.roots.side)
+        write_partings(writer, GROOM.roots.partings)
         writer.write("strands/key", GROOM.key)
         writer.write("guides/strand", GROOM.guides.strand)
         if head:

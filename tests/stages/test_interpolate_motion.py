@@ -11,8 +11,10 @@ from pipeline.interpolate.bind import Groom, bind
 from pipeline.interpolate.copies import Roots
 from pipeline.interpolate.follow import GuideSet, shape_of
 from pipeline.simulate.stepper import Guides, Simulation
+from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding, Expansion
 from pipeline.strands.held import held_ends
+from pipeline.strands.partings import Neighbours, Partings
 from tests.conftest import helix
 
 Floats = NDArray[np.float64]
@@ -48,9 +50,9 @@ def hung(rest: Floats) -> Floats:
 
 def bound(rest: Floats) -> Binding:
     points, strand = rest.astype(np.float32), np.arange(GUIDES, dtype=np.uint32)
-    side, root = np.zeros(STRANDS, np.int8), rest[:, 0]
-    guides = GuideSet(root[strand], shape_of(points[strand]), side[strand], strand)
-    groom = Groom(lambda a, b: points[a:b], Roots(root, side, None), np.zeros(STRANDS, np.uint32), guides)
+    root, partings = rest[:, 0], Partings(Chart.from_above())
+    guides = GuideSet(Neighbours(root[strand], partings), shape_of(points[strand]), strand)
+    groom = Groom(lambda a, b: points[a:b], Roots(root, partings, None), np.zeros(STRANDS, np.uint32), guides)
     return next(bind(groom, Interpolate(), seed=1))
 
 

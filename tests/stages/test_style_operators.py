@@ -25,6 +25,8 @@ from pipeline.groom.style.chance import Chance
 from pipeline.groom.style.ground import Ground
 from pipeline.groom.style.hair import Hair
 from pipeline.groom.style.stack import OPERATORS, Stack
+from pipeline.strands.chart import Chart
+from pipeline.strands.partings import Neighbours, Partings
 from pipeline.strands.spacing import arc_length
 from tests.stages.conftest import shipped
 
@@ -49,7 +51,6 @@ def hanging(index: NDArray[np.int64]) -> Hair:
         index=index,
         root=root,
         normal=down,
-        side=np.zeros(len(index), np.int8),
         points=root[:, None] + np.linspace(0, 0.3, POINTS)[:, None] * down[:, None],
         length=np.full(len(index), 0.3),
         comb=np.tile([1.0, 0.0, 0.0], (len(index), 1)),
@@ -59,7 +60,7 @@ def hanging(index: NDArray[np.int64]) -> Hair:
 def styled(*operators: Operator, count: int = COUNT, **named: Operator) -> Hair:
     style = {f"{op.op}{k}": op for k, op in enumerate(operators)} | named  # type: ignore[attr-defined]
     every = hanging(np.arange(count))
-    stack = Stack(style, Ground(SEED, POINTS), hanging, every.root, every.side)
+    stack = Stack(style, Ground(SEED, POINTS), hanging, Neighbours(every.root, Partings(Chart.from_above())))
     return stack.strands(np.arange(count))
 
 
@@ -299,7 +300,7 @@ def test_every_operator_gives_the_same_bytes_in_any_chunk() -> None:
         "short": Lengths(op="length", length=0.15, jitter=0.1),
     }
     every = hanging(np.arange(COUNT))
-    stack = Stack(style, Ground(SEED, POINTS), hanging, every.root, every.side)
+    stack = Stack(style, Ground(SEED, POINTS), hanging, Neighbours(every.root, Partings(Chart.from_above())))
     whole = stack.strands(np.arange(COUNT))
     for some in ([0], [7, 3, 399], list(range(100, 231))):
         part = stack.strands(np.array(some))

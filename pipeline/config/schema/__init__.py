@@ -8,9 +8,10 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from pipeline.config.schema.base import Section
-from pipeline.config.schema.groom import Groom, Parting, Swatch
+from pipeline.config.schema.groom import Groom, Swatch
 from pipeline.config.schema.hair_contact import HairContact
 from pipeline.config.schema.interpolate import Interpolate, Variation
+from pipeline.config.schema.partings import Parting
 from pipeline.config.schema.render import Fibre, Render
 from pipeline.config.schema.scene import Camera, Light, Scene
 from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, SagFree, Simulate

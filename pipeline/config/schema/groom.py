@@ -5,15 +5,9 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from pipeline.config.schema.base import Section, Vector
+from pipeline.config.schema.partings import Parting, PartingName
 from pipeline.config.schema.style import AnyOperator, StyleName, in_order
 from pipeline.config.units import Length
-
-
-class Parting(Section):
-    offset: Length = 0.0
-    """Sideways place of the parting on the skull; positive is the head's left."""
-    enabled: bool = True
-    """Without a parting hair flows away from the crown's whorl."""
 
 
 class Swatch(Section):
@@ -44,8 +38,8 @@ class Groom(Section):
     """Number of strands that are simulated."""
     points: Annotated[int, Field(ge=8, le=256)] = 32
     """Points on every strand and guide, at equal spacing."""
-    parting: Parting = Parting()
-    """Where the hair parts."""
+    partings: dict[PartingName, Parting] = Field(default={}, max_length=100)
+    """Lines on the scalp, by name, that hair flows away from and does not blend across; without any it flows from the crown's whorl."""
     style: Annotated[dict[StyleName, AnyOperator], AfterValidator(in_order)] = Field(default={})
     """The style operators by name, in the order that they work in; without any, hair stands off the skin."""
     swatch: Swatch = Swatch()

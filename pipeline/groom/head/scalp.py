@@ -1,32 +1,36 @@
-"""The mannequin's scalp: hairline, density of roots, and an equal-area chart of the skin.
+"""The mannequin's scalp: hairline, density of roots, and its chart.
 
-Chart: Lambert's equal-area projection about the crown's whorl. The scalp is star-shaped about `center`, so a chart
-point is a ray from there; the skin's area per chart area is r^2 / cos(normal, ray).
+The scalp is star-shaped about the chart's centre, so a chart point is a ray from there; the skin's area per chart area
+is 4 r^2 / cos(normal, ray).
 """
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from pipeline.groom.head.distance import dot, fold_parts, norm, smoothstep
+from pipeline.groom.head.distance import fold_parts, smoothstep
 from pipeline.groom.head.table import load_table, part
+from pipeline.strands.chart import Chart
 
 Points = NDArray[np.floating[Any]]
 
 _EAR_CLEARANCE = 3e-3  # [m] no roots on the ears
+_OUTSIDE, _STEPS = 0.16, 14  # [m] from the chart's centre, and steps of tracing
 
 
-def center() -> NDArray[np.float64]:
-    """The point inside the skull that chart rays start from [m]."""
-    return np.array(load_table()["scalp"]["center"], float)
-
-
-def whorl() -> NDArray[np.float64]:
-    """Unit vector from the chart's centre to the crown's whorl."""
-    w = np.array(load_table()["scalp"]["whorl"], float)
-    return np.asarray(w / np.linalg.norm(w))
+@cache
+def chart() -> Chart:
+    """The chart of the skin about the crown's whorl, in the mannequin's coordinates."""
+    scalp = load_table()["scalp"]
+    w = np.array(scalp["whorl"], float)
+    w /= np.linalg.norm(w)
+    face = np.cross(w, [-1, 0, 0])
+    face /= np.linalg.norm(face)
+    return Chart(np.array(scalp["center"], float), np.stack([np.cross(face, w), face, w]))
 
 
 def density(p: Points) -> Points:
@@ -37,12 +41,14 @@ def density(p: Points) -> Points:
     return smoothstep(_margin(p) / load_table()["scalp"]["fade"]) * smoothstep(clear / _EAR_CLEARANCE)
 
 
-def chart_frame() -> NDArray[np.float64]:
-    """Rows: the head's right, towards the face, out of the whorl (right-handed seen from outside)."""
-    w = whorl()
-    face = np.cross(w, [-1, 0, 0])
-    face /= np.linalg.norm(face)
-    return np.stack([np.cross(face, w), face, w])
+def on_skin(distance: Callable[[Points], Points], uv: Points) -> NDArray[np.float64]:
+    """Points (N, 3) of the skin at chart points (N, 2), by sphere tracing from outside; fitted coordinates."""
+    head = chart()
+    ray = head.rays(uv)
+    reach = np.full(len(ray), _OUTSIDE)
+    for _ in range(_STEPS):
+        reach -= distance(head.center + reach[:, None] * ray)
+    return np.asarray(head.center + reach[:, None] * ray)
 
 
 def _margin(p: Points) -> Points:
@@ -54,16 +60,3 @@ def _margin(p: Points) -> Points:
     azimuth = np.arctan2(x, z)
     slope = line(azimuth, 1) / np.maximum(np.hypot(x, z), 0.02)
     return np.asarray((p[:, 1] - line(azimuth)) / np.hypot(1, slope))
-
-
-def rays(uv: Points) -> NDArray[np.float64]:
-    """Unit rays (N, 3) of chart points (N, 2) in the unit disc."""
-    r2 = dot(uv, uv)[:, None]
-    return np.hstack([2 * uv * np.sqrt(np.maximum(1 - r2, 0)), 1 - 2 * r2]) @ chart_frame()
-
-
-def to_chart(p: Points) -> Points:
-    """Chart points (N, 2) of points on the head."""
-    q = (p - center()) @ chart_frame().T
-    q /= norm(q)[:, None]
-    return np.asarray(q[:, :2] / np.sqrt(2 * (1 + q[:, 2:])))

@@ -9,6 +9,7 @@ from pipeline.groom.head.distance import smoothstep
 from pipeline.groom.style.chance import Chance
 from pipeline.groom.style.ground import Ground
 from pipeline.groom.style.hair import Hair, Index, Vectors
+from pipeline.strands.partings import NOBODY
 
 _STRENGTH = 0  # use of chance
 _PAST_THE_TIP = 4.0  # points that a middle is drawn on, straight, for strands longer than it
@@ -18,8 +19,10 @@ def clumped(hair: Hair, op: Clump, ground: Ground, chance: Chance) -> Hair:
     """Strands drawn to their middles, more and more over `over`."""
     middles, lock = ground.middles[chance.name], hair.locks[chance.name]
     jitter = 1 - op.strength_jitter * chance.uniform(hair.index, _STRENGTH)
-    strength = ground.values(op.strength, hair) * jitter
-    points = gathered(hair.points, hair.length, middles.points, middles.length, lock, strength, op.over)
+    strength = np.where(lock == NOBODY, 0, ground.values(op.strength, hair) * jitter)
+    points = gathered(
+        hair.points, hair.length, middles.points, middles.length, lock.clip(min=0), strength, op.over
+    )
     return replace(hair, points=points)
 
 

@@ -17,7 +17,8 @@ def directed(hair: Hair, op: Direction, ground: Ground, chance: Chance) -> Hair:
     """Strands of the same lengths, along the paths of combing."""
     terrain, index = ground.under(op.op), hair.index
     sweep = ground.values(op.sweep, hair)
-    flow = terrain.flow(hair.side, hair.root, hair.normal)
+    standoff = terrain.combing.standoff(hair.root)
+    flow = terrain.combing.flow(hair.root, hair.normal, standoff)
     comb = unit(flow + tangential(swept(hair.root, sweep), hair.normal))
     if not len(hair):
         return hair
@@ -25,7 +26,7 @@ def directed(hair: Hair, op: Direction, ground: Ground, chance: Chance) -> Hair:
     wander = [op.wander * chance.directions(index, _WANDER + 3 * k) for k in range(stretches(steps))]
     own = Sprouts(
         root=hair.root,
-        side=hair.side,
+        standoff=standoff,
         first=_first_direction(hair, op, ground, chance, comb),
         sweep=sweep,
         layer=ground.values(op.lift, hair) * (0.25 + 0.75 * chance.layer(index)),

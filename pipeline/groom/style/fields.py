@@ -14,7 +14,6 @@ from PIL import Image
 from pipeline.config.formula import parse
 from pipeline.config.schema import Varied
 from pipeline.errors import InputError
-from pipeline.groom.head import scalp
 from pipeline.groom.head.distance import smoothstep
 from pipeline.strands.random import hashed, uniform
 
@@ -127,18 +126,8 @@ def _smoothstep(a: Values, b: Values, x: Values) -> Values:
     return np.asarray(smoothstep(np.asarray((x - a) / (b - a))), np.float64)
 
 
-def _parting(at: Scalp) -> Values:
-    parting = at.terrain.parting
-    return parting.distance(at.root) if parting else np.ones(len(at.index))
-
-
 def _crown(at: Scalp) -> Values:
-    skin = at.terrain.skin
-    whorl = scalp.center() + 0.1 * scalp.whorl()
-    for _ in range(8):
-        d, n = skin.sample(whorl[None])
-        whorl = whorl - d[0] * n[0]
-    return np.asarray(np.sqrt(((at.root - whorl) ** 2).sum(axis=1)))
+    return np.asarray(np.linalg.norm(at.root - at.head.on_skin(np.zeros((1, 2))), axis=1))
 
 
 _VARIABLES: dict[str, Callable[[Scalp], Values]] = {
@@ -151,7 +140,7 @@ _VARIABLES: dict[str, Callable[[Scalp], Values]] = {
     "front": lambda at: (at.root[:, 2] - _BACK) / (_FOREHEAD - _BACK),
     "side": lambda at: at.root[:, 0] / _EAR,
     "crown": _crown,
-    "parting": _parting,
+    "parting": lambda at: at.terrain.combing.distance(at.root),
     "random": lambda at: uniform(at.seed, at.index, _RANDOM),
 }
 _FUNCTIONS: dict[str, Callable[..., Any]] = {

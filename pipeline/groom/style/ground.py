@@ -9,36 +9,20 @@ from numpy.typing import NDArray
 
 from pipeline.config.schema import Varied
 from pipeline.errors import InputError
-from pipeline.groom.head import scalp
+from pipeline.groom.combing import Combing
 from pipeline.groom.head_field import Field
 from pipeline.groom.heads import Head
-from pipeline.groom.partings import PartingLine
 from pipeline.groom.style.fields import Scalp, varied
-from pipeline.groom.style.hair import Hair, Middles, Vectors, unit
-
-_WHORL = 0.35  # [rad] turn of the flow about the whorl where there is no parting
+from pipeline.groom.style.hair import Hair, Middles, Vectors
 
 
 @dataclass(frozen=True)
 class Terrain:
-    """Skin, wall (the skin with a guard in front of the face) and the parting."""
+    """Skin, wall (the skin with a guard in front of the face) and the combing of the scalp."""
 
     skin: Field
     wall: Field
-    parting: PartingLine | None
-
-    def side(self, roots: Vectors) -> NDArray[np.int8]:
-        """Side of the parting (N,) that roots lie on: 1 left, -1 right, 0 where there is none."""
-        return self.parting.side(roots) if self.parting else np.zeros(len(roots), np.int8)
-
-    def flow(self, side: NDArray[np.int8], p: Vectors, n: Vectors) -> Vectors:
-        """Tangential unit direction of the combing: away from the parting, or from the whorl, and around its end."""
-        if self.parting is not None:
-            away, swirl = self.parting.away(p, side), self.parting.swirl(p)[:, None]
-        else:
-            away, swirl = -np.broadcast_to(scalp.whorl(), p.shape), np.full((1, 1), _WHORL)
-        away = unit(tangential(away, n))
-        return np.asarray(np.cos(swirl) * away + np.sin(swirl) * np.cross(n, away))
+    combing: Combing
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ Arrays alone, in fitted coordinates, y up.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.groom.head.distance import smoothstep
 from pipeline.groom.style.ground import Terrain, tangential
@@ -28,7 +27,8 @@ class Sprouts:
     """What sets the growth of single strands apart; each (N,) or (N, 3)."""
 
     root: Vectors
-    side: NDArray[np.int8]
+    standoff: Vectors
+    """(N, 2), see `Combing`."""
     first: Vectors
     """Unit direction of the first step."""
     sweep: Vectors
@@ -60,7 +60,7 @@ def grown(own: Sprouts, terrain: Terrain, lift_over: float, steps: int) -> Vecto
         sunk = smoothstep((JAW - p[:, 1]) / _FADE)
         layer = _CLEARANCE + own.layer * smoothstep(np.asarray(s / lift_over)) * (1 - 0.9 * sunk)
         fade = np.exp(-s / own.comb)[:, None]
-        flow = unit(terrain.flow(own.side, p, m) + tangential(front, m))
+        flow = unit(terrain.combing.flow(p, m, own.standoff) + tangential(front, m))
         target = unit(fade * flow + (1 - fade) * _DOWN + own.wander[:, (k - 1) // _STRETCH])
         dive = np.minimum(dot(target, m), 0) * smoothstep(1.5 - (d - layer) / 0.006)[:, None]
         target = unit(target - dive * m + m * np.clip((layer - d) / own.bend, 0, 0.8)[:, None])

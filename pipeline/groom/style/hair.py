@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.strands.partings import NOBODY
 from pipeline.strands.spacing import arc_length, at_arc_length
 
 Vectors = NDArray[np.float64]
@@ -27,8 +28,6 @@ class Hair:
     """(N, 3) [m]"""
     normal: Vectors
     """(N, 3) unit normals of the skin."""
-    side: NDArray[np.int8]
-    """(N,) side of the parting: 1 left, -1 right, 0 where there is none."""
     points: Vectors
     """(N, K, 3) [m], root first, at equal parts of `length`."""
     length: Vectors
@@ -36,7 +35,7 @@ class Hair:
     comb: Vectors
     """(N, 3) unit direction that the strand is combed to at its root; frames start from it."""
     locks: Mapping[str, Index] = field(default_factory=dict)
-    """Of every clump operator, the clump (N,) that the strands belong to."""
+    """Of every clump operator, the clump (N,) that the strands belong to, `NOBODY` where to none."""
 
     def __len__(self) -> int:
         return len(self.index)
@@ -47,8 +46,8 @@ class Hair:
         return np.linspace(0, 1, self.points.shape[1]) * self.length[:, None]
 
     def lock(self, per: str | None) -> Index:
-        """The clump (N,) of an operator that strands belong to; each is by itself if there is none."""
-        return self.index if per is None else self.locks[per]
+        """The clump (N,) of an operator that strands belong to; a strand in none is by itself."""
+        return self.index if per is None else np.where(self.locks[per] == NOBODY, self.index, self.locks[per])
 
 
 @dataclass(frozen=True)

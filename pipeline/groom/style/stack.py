@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.config.schema import (
     Clump,
@@ -25,11 +24,12 @@ from pipeline.groom.style.direction import directed
 from pipeline.groom.style.flyaway import flown
 from pipeline.groom.style.frizz import frizzed
 from pipeline.groom.style.ground import Ground
-from pipeline.groom.style.hair import Hair, Index, Middles, Vectors
+from pipeline.groom.style.hair import Hair, Index, Middles
 from pipeline.groom.style.lengths import lengthened
 from pipeline.groom.style.locks import Locks
 from pipeline.groom.style.trim import trimmed
 from pipeline.groom.style.wave import waved
+from pipeline.strands.partings import Neighbours
 
 CHUNK = 8192  # strands that are carried at once
 
@@ -53,10 +53,9 @@ class Stack:
         style: Mapping[str, Operator],
         ground: Ground,
         start: Callable[[Index], Hair],
-        roots: Vectors,
-        side: NDArray[np.int8],
+        roots: Neighbours,
     ) -> None:
-        """Carry the middles of every clump operator, from the roots (S, 3) and sides (S,) of all strands, to it.
+        """Carry the middles of every clump operator, to it; `roots` are those of all strands, in world coordinates.
 
         A clump operator that is switched off still tells which strands belong together.
         """
@@ -66,7 +65,7 @@ class Stack:
         for name, op in style.items():
             if isinstance(op, Clump):
                 parent = self._locks[op.within] if op.within else None
-                self._locks[name] = Locks(op.count, roots, side, parent)
+                self._locks[name] = Locks(op.count, roots, parent)
         self._middles: dict[str, Middles] = {}
         self._ground = replace(ground, middles=self._middles)
         for k, (name, op) in enumerate(self._steps):
@@ -86,7 +85,7 @@ class Stack:
 
     def _through(self, index: Index, steps: int) -> Hair:
         hair = self._start(index)
-        locks = {name: found.of(hair.root, hair.side) for name, found in self._locks.items()}
+        locks = {name: found.of(index) for name, found in self._locks.items()}
         hair = replace(hair, locks=locks)
         for name, op in self._steps[:steps]:
             hair = OPERATORS[type(op)](hair, op, self._ground, Chance(self._ground.seed, name))

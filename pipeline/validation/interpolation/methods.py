@@ -24,7 +24,9 @@ from pipeline.config.schema import Interpolate
 from pipeline.interpolate.bind import Groom, bind
 from pipeline.interpolate.copies import Roots
 from pipeline.interpolate.follow import GuideSet, shape_of
+from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding, Expansion
+from pipeline.strands.partings import Neighbours, Partings
 from pipeline.validation.interpolation.scene import Index, Scene
 
 Floats = NDArray[np.float64]
@@ -47,10 +49,11 @@ class Following:
     @classmethod
     def of(cls, scene: Scene, guides: Index) -> "Following":
         """All strands that are no guides, bound as production binds them."""
-        points, side = scene.points, np.zeros(len(scene), np.int8)
+        points, partings = scene.points, Partings(Chart.from_above())
         root, key = points[:, 0].astype(np.float64), np.zeros(len(points), np.uint32)
-        chosen = GuideSet(root[guides], shape_of(points[guides]), side[guides], guides.astype(np.uint32))
-        groom = Groom(lambda a, b: points[a:b], Roots(root, side, scene.field), key, chosen)
+        roots = Neighbours(root[guides], partings)
+        chosen = GuideSet(roots, shape_of(points[guides]), guides.astype(np.uint32))
+        groom = Groom(lambda a, b: points[a:b], Roots(root, partings, scene.field), key, chosen)
         binding = next(bind(groom, Interpolate(), 1))
         return cls(scene, np.setdiff1d(np.arange(len(points)), guides), guides, binding)
 

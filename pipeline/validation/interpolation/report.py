@@ -104,7 +104,7 @@ def merged(plan: Plan, parts: list[Report]) -> Report:
 def chosen(hair: Scene, choice: str, count: int) -> Index:
     """Guides (G,), ascending: production's choice, or any strands."""
     if choice == "ours":
-        return choose_guides(hair.points, np.zeros(len(hair), np.int8), count).astype(np.int64)
+        return choose_guides(hair.points, count).astype(np.int64)
     return np.sort(np.argsort(uniform(1, np.arange(len(hair)), 0x1F10))[:count])
 
 
