@@ -15,40 +15,54 @@
 
 namespace ringlet {
 
-/// What strands grow over: the wall, and on a grid for each of several labels the flow of the combing.
+/// What strands grow over: the wall, and the flow of the combing on a grid over the scalp's chart.
+///
+/// Chart: Lambert's equal-area projection, (u, v) = (q1, q2) / sqrt(2 (1 + q3)) of the direction q from the centre in
+/// axes e1, e2, w; a strand looks the flow up at its chart point plus a standoff of its own. Node i, j of the grid is
+/// chart point -1 + 2 (i, j) / (n - 1).
 struct Terrain {
     const DistanceField *wall;
-    std::vector<float> flow; // (labels, 3, nx, ny, nz)
-    int labels, n[3];
-    double origin[3], spacing, step; // of the grid [m]; arc length [m] of a segment
+    double center[3], axes[3][3];
+    std::vector<float> grid; // (n, n, 4), the first three of four numbers a vector
+    int n;
+    double step; // arc length [m] of a segment
 
-    /// The flow of each lane's label, trilinear, clamped to the grid's box.
-    Vec3<double> flow_at(Vec3<double> x, Mask<double> label) const {
-        const Lanes<double> at[3] = {x.x - origin[0], x.y - origin[1], x.z - origin[2]};
-        Mask<double> cell[3];
-        Lanes<double> part[3];
-        for (int k = 0; k < 3; ++k) {
-            const Lanes<double> u = at[k] / spacing, last = splat(n[k] - 1.001);
-            const Lanes<double> inside = select<double>(u >= 0, minimum<double>(u, last), Lanes<double>{});
+    Vec3<double> flow_at(Vec3<double> x, const Lanes<double> (&standoff)[2]) const {
+        const Vec3<double> p = x - broadcast<double>(center);
+        Lanes<double> q[3];
+        for (int k = 0; k < 3; ++k) q[k] = p.x * axes[k][0] + p.y * axes[k][1] + p.z * axes[k][2];
+        const Lanes<double> squares = dot(p, p), length = square_root<double>(squares);
+        // The direction against the whorl has no place in the chart
+        const Lanes<double> half = inverse_root<double>(2 * maximum<double>(squares + length * q[2], 1e-12 * squares + 1e-300));
+        Mask<double> cell[2];
+        Lanes<double> part[2];
+        for (int k = 0; k < 2; ++k) {
+            const Lanes<double> place = (q[k] * half + standoff[k] + 1) * (0.5 * (n - 1));
+            const Lanes<double> inside = place > 0 ? minimum<double>(place, splat(n - 1 - 1e-9)) : Lanes<double>{};
             cell[k] = __builtin_convertvector(inside, Mask<double>);
             part[k] = inside - __builtin_convertvector(cell[k], Lanes<double>);
         }
-        const int row = n[1] * n[2], volume = n[0] * row;
-        const Mask<double> corner = label * (3 * volume) + (cell[0] * n[1] + cell[1]) * n[2] + cell[2];
-        Lanes<double> v[3];
-        for (int k = 0; k < 3; ++k) {
-            const float *values = flow.data() + size_t(k) * volume;
-            Lanes<double> y[2];
-            for (int i = 0; i < 2; ++i) {
-                Lanes<double> a, b, c, d;
-                gather_pairs<double>(values + i * row, corner, a, b);
-                gather_pairs<double>(values + i * row + n[2], corner, c, d);
-                const Lanes<double> low = a + part[2] * (b - a), high = c + part[2] * (d - c);
-                y[i] = low + part[1] * (high - low);
-            }
-            v[k] = y[0] + part[0] * (y[1] - y[0]);
+        const Mask<double> node = cell[0] * n + cell[1];
+        Vec3<double> flow;
+        for (int lane = 0; lane < kLanes<double>; ++lane) {
+            const float *corner = grid.data() + 4 * node[lane];
+            const Quad low = quad(corner) + part[1][lane] * (quad(corner + 4) - quad(corner));
+            corner += 4 * n;
+            const Quad high = quad(corner) + part[1][lane] * (quad(corner + 4) - quad(corner));
+            const Quad v = low + part[0][lane] * (high - low);
+            flow.x[lane] = v[0], flow.y[lane] = v[1], flow.z[lane] = v[2];
         }
-        return {v[0], v[1], v[2]};
+        return flow;
+    }
+
+  private:
+    typedef double Quad __attribute__((vector_size(32)));
+    typedef float FloatQuad __attribute__((vector_size(16)));
+
+    static RINGLET_INLINE Quad quad(const float *from) {
+        FloatQuad values;
+        __builtin_memcpy(&values, from, sizeof values);
+        return __builtin_convertvector(values, Quad);
     }
 };
 
@@ -56,12 +70,13 @@ struct Terrain {
 struct Growth {
     Lanes<double> height, over, bend, comb; // [m]: of the layer, arc length to reach it, see above
     Vec3<double> sweep;                     // added to the flow
+    Lanes<double> standoff[2];              // in the chart
     Lanes<double> length;                   // [m]: what lies beyond goes straight on
 };
 
 class Grower {
   public:
-    Grower(const Terrain &terrain, const Growth &growth, Mask<double> label) : terrain_(terrain), growth_(growth), label_(label) {
+    Grower(const Terrain &terrain, const Growth &growth) : terrain_(terrain), growth_(growth) {
         for (int lane = 0; lane < kLanes<double>; ++lane) decay_[lane] = std::exp(-terrain.step / growth.comb[lane]);
         longest_ = int(std::ceil(largest<double>(growth.length) / terrain.step));
     }
@@ -98,7 +113,7 @@ class Grower {
         wall(x, d, m);
         const Lanes<double> sunk = smoothstep((kJaw - x.y) / kSink);
         const Lanes<double> layer = kClearance + g.height * smoothstep(s / g.over) * (1 - 0.9 * sunk);
-        const Vec3<double> combed = direction(tangential(terrain_.flow_at(x, label_), m));
+        const Vec3<double> combed = direction(tangential(terrain_.flow_at(x, g.standoff), m));
         const Vec3<double> flow = direction(combed + tangential(g.sweep, m));
         Vec3<double> target = fade * flow + noise;
         target.y -= 1 - fade;
@@ -117,7 +132,6 @@ class Grower {
 
     const Terrain &terrain_;
     const Growth &growth_;
-    Mask<double> label_;
     Lanes<double> decay_;
     int longest_;
 };
