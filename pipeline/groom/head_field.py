@@ -37,6 +37,10 @@ class Field:
         """Distances (N,) [m] at points (N, 3)."""
         return self.sample(p)[0]
 
+    def outside(self, points: Points, clearance: Vectors, rounds: int) -> tuple[Vectors, Vectors]:
+        """Strands (N, P, 3) [m] pushed out to `clearance` (P,) [m] (-inf: stays), and how deep they were (N,) [m]."""
+        return kernels.outside(self._native, np.ascontiguousarray(points, np.float64), clearance, rounds)
+
     @property
     def _native(self) -> kernels.DistanceField:
         found = self.__dict__.get("_kernel")

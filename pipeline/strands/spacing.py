@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 Points = NDArray[np.floating[Any]]
 
 
-
 def arc_length(points: Points) -> NDArray[np.float64]:
     """Arc length (S, P) [m] from the root to each point of (S, P, 3) [m]."""
     lengths = np.zeros(points.shape[:2])

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline import kernels
 from pipeline.strands.partings import NOBODY
-from pipeline.strands.spacing import arc_length, at_arc_length
 
 Vectors = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -16,6 +16,16 @@ Index = NDArray[np.int64]
 LONGEST = 0.42  # [m]
 STEP = 4e-3  # [m] between the points of hair that is not cut yet
 UNCUT = round(LONGEST / STEP) + 1  # points
+
+
+@dataclass(frozen=True)
+class Ties:
+    """Rings that strands are pulled through."""
+
+    at: Vectors
+    """(N,) [m] arc length from the root to the ring; 0 where there is none."""
+    ring: Vectors
+    """(N, 6) its middle [m] and axis; not-a-number where there is none."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +46,8 @@ class Hair:
     """(N, 3) unit direction that the strand is combed to at its root; frames start from it."""
     locks: Mapping[str, Index] = field(default_factory=dict)
     """Of every clump operator, the clump (N,) that the strands belong to, `NOBODY` where to none."""
+    ties: Ties | None = None
+    """What ties strands together; None where nothing does."""
 
     def __len__(self) -> int:
         return len(self.index)
@@ -44,6 +56,11 @@ class Hair:
     def along(self) -> Vectors:
         """Arc length (N, K) [m] of the axis from the root to every point."""
         return np.linspace(0, 1, self.points.shape[1]) * self.length[:, None]
+
+    @property
+    def free_from(self) -> Vectors:
+        """Arc length (N,) [m] from which strands hang free: 0, or where they are tied."""
+        return np.zeros(len(self)) if self.ties is None else self.ties.at
 
     def lock(self, per: str | None) -> Index:
         """The clump (N,) of an operator that strands belong to; a strand in none is by itself."""
@@ -67,7 +84,7 @@ def bristles(root: Vectors, normal: Vectors) -> Vectors:
 
 def cut_to(points: Vectors, length: Vectors, count: int) -> Vectors:
     """The first `length` (N,) [m] of strands (N, K, 3), as `count` points at equal arc lengths."""
-    return np.asarray(at_arc_length(points, arc_length(points), np.linspace(0, 1, count) * length[:, None]))
+    return kernels.shortened(points, length, count)
 
 
 def shortened(whole: Vectors, jitter: float, own: Vectors, rare: Vectors) -> Vectors:

@@ -7,22 +7,28 @@ from typing import Any
 import numpy as np
 
 from pipeline.config.schema import (
+    Bend,
     Clump,
     Curl,
     Direction,
     Flyaway,
+    Fringe,
     Frizz,
+    Gather,
     Lengths,
     Operator,
     Trim,
     Wave,
 )
+from pipeline.groom.style.bend import bent
 from pipeline.groom.style.chance import Chance
 from pipeline.groom.style.clump import clumped
 from pipeline.groom.style.curl import curled
 from pipeline.groom.style.direction import directed
 from pipeline.groom.style.flyaway import flown
+from pipeline.groom.style.fringe import fringed
 from pipeline.groom.style.frizz import frizzed
+from pipeline.groom.style.gather import gathered
 from pipeline.groom.style.ground import Ground
 from pipeline.groom.style.hair import Hair, Index, Middles
 from pipeline.groom.style.lengths import lengthened
@@ -42,6 +48,9 @@ OPERATORS: dict[type[Operator], Callable[[Hair, Any, Ground, Chance], Hair]] = {
     Wave: waved,
     Frizz: frizzed,
     Flyaway: flown,
+    Bend: bent,
+    Gather: gathered,
+    Fringe: fringed,
 }
 
 
