@@ -798,18 +798,13 @@ def shaken(points: _F64, length: _F64, sines: _F64, rise: _F64) -> _F64:
     """
 
 def drawn_in(
-    points: _F64,
-    length: _F64,
-    middles: _F64,
-    middle_length: _F64,
-    lock: NDArray[np.int64],
-    strength: _F64,
-    over: _F64,
+    points: _F64, length: _F64, middles: _F64, middle_length: _F64, lock: NDArray[np.int64], pull: _F64
 ) -> _F64:
-    """Points (S, P, 3) [m] moved towards the point of their lock's middle at the same arc length s.
+    """Points (S, P, 3) [m] moved towards points of the middle (M, Q, 3) that `lock` (S,) tells, of middle_length (M,) [m].
 
-    By strength (S,) * smoothstep(s / over (S,) [m]). The lock (S,) tells the middle (M, Q, 3) of length
-    middle_length (M,) [m]; a middle that is too short goes straight on.
+    `pull` (S, 4) is strength, over, begin and shift [m]: the point at arc length s moves by the part
+    strength * smoothstep((s - begin) / over) of the way to the middle's at s + shift. A middle that is too short goes
+    straight on.
     """
 
 def outside(field: DistanceField, points: _F64, clearance: _F64, rounds: int) -> tuple[_F64, _F64]:

@@ -112,11 +112,10 @@ static Numbers shaken(Strands points, PerStrand length, Array<const double, -1, 
 }
 
 static Numbers drawn_in(Strands points, PerStrand length, Strands middles, PerStrand middle_length,
-                        Array<const int64_t, -1> lock, PerStrand strength, PerStrand over) {
+                        Array<const int64_t, -1> lock, Array<const double, -1, 4> pull) {
     const size_t S = points.shape(0), P = points.shape(1), M = middles.shape(0);
     require(P >= 2 && middles.shape(1) >= 2, "drawn_in: expected strands of at least 2 points");
-    require(length.shape(0) == S && lock.shape(0) == S && strength.shape(0) == S && over.shape(0) == S,
-            "drawn_in: expected a row for each strand");
+    require(length.shape(0) == S && lock.shape(0) == S && pull.shape(0) == S, "drawn_in: expected a row for each strand");
     require(middle_length.shape(0) == M, "drawn_in: expected a length for each middle");
     const int64_t *of = lock.data();
     require(std::all_of(of, of + S, [&](int64_t l) { return l >= 0 && size_t(l) < M; }), "drawn_in: no such lock");
@@ -124,9 +123,11 @@ static Numbers drawn_in(Strands points, PerStrand length, Strands middles, PerSt
     nb::gil_scoped_release release;
     const Middles all{middles.data(), middle_length.data(), int(middles.shape(1))};
 #pragma omp parallel for schedule(static, 64) num_threads(threads_for(S))
-    for (ptrdiff_t i = 0; i < ptrdiff_t(S); ++i)
-        draw_in(points.data() + i * 3 * P, int(P), length.data()[i], all, of[i], strength.data()[i], over.data()[i],
+    for (ptrdiff_t i = 0; i < ptrdiff_t(S); ++i) {
+        const double *row = pull.data() + 4 * i;
+        draw_in(points.data() + i * 3 * P, int(P), length.data()[i], all, of[i], {row[0], row[1], row[2], row[3]},
                 out.data() + i * 3 * P);
+    }
     return out;
 }
 
@@ -226,7 +227,7 @@ void bind_groom(nb::module_ &m) {
     m.def("coiled", &coiled, nb::arg("points"), nb::arg("reference"), nb::arg("length"), nb::arg("coil"));
     m.def("shaken", &shaken, nb::arg("points"), nb::arg("length"), nb::arg("sines"), nb::arg("rise"));
     m.def("drawn_in", &drawn_in, nb::arg("points"), nb::arg("length"), nb::arg("middles"), nb::arg("middle_length"),
-          nb::arg("lock"), nb::arg("strength"), nb::arg("over"));
+          nb::arg("lock"), nb::arg("pull"));
     m.def("shortened", &shortened, nb::arg("points"), nb::arg("length"), nb::arg("count"));
     m.def("first_outside", nb::overload_cast<Strands, PerStrand, Array<const double, 4>, bool, double>(&first_outside), nb::arg("points"), nb::arg("margin"), nb::arg("shape"), nb::arg("ball"),
           nb::arg("hang"));

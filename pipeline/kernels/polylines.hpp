@@ -70,14 +70,20 @@ struct Middles {
     int Q;
 };
 
-/// Moves a strand's points towards the middle's at the same arc length, by strength * smoothstep(s / over).
-inline void draw_in(const double *points, int P, double length, const Middles &middles, int64_t lock, double strength,
-                    double over, double *out) {
+/// How a strand is drawn: from arc length `begin` on by strength * smoothstep((s - begin) / over), towards the middle's
+/// point at arc length s + shift.
+struct Pull {
+    double strength, over, begin, shift;
+};
+
+inline void draw_in(const double *points, int P, double length, const Middles &middles, int64_t lock, const Pull &pull,
+                    double *out) {
     const double *middle = middles.points + size_t(lock) * middles.Q * 3, per_length = (middles.Q - 1) / middles.length[lock];
     for (int j = 0; j < P; ++j) {
-        const double s = length * j / (P - 1), t = std::clamp(s / over, 0.0, 1.0), weight = strength * t * t * (3 - 2 * t);
+        const double s = length * j / (P - 1), t = std::clamp((s - pull.begin) / pull.over, 0.0, 1.0);
+        const double weight = pull.strength * t * t * (3 - 2 * t);
         double target[3];
-        point_at(middle, middles.Q, s * per_length, target);
+        point_at(middle, middles.Q, (s + pull.shift) * per_length, target);
         for (int k = 0; k < 3; ++k) out[3 * j + k] = points[3 * j + k] + weight * (target[k] - points[3 * j + k]);
     }
 }

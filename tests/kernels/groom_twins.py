@@ -46,12 +46,12 @@ def drawn_in(
     middles: Vectors,
     middle_length: Vectors,
     lock: NDArray[np.int64],
-    strength: Vectors,
-    over: Vectors,
+    pull: Vectors,
 ) -> Vectors:
+    strength, over, begin, shift = pull.T[:, :, None]
     along = np.linspace(0, 1, points.shape[1]) * length[:, None]
-    target = at(middles, along / middle_length[lock][:, None] * (middles.shape[1] - 1), lock)
-    weight = strength[:, None] * smoothstep(along / over[:, None])
+    target = at(middles, (along + shift) / middle_length[lock][:, None] * (middles.shape[1] - 1), lock)
+    weight = strength * smoothstep((along - begin) / over)
     return points + weight[..., None] * (target - points)
 
 

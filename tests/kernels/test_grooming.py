@@ -110,7 +110,8 @@ def test_locks_are_those_of_their_twin(rng: np.random.Generator, strands: Vector
     middles = groom_twins.shortened(strands, rng.uniform(0.05, 0.15, S), 19)[:5]
     lengths = np.linalg.norm(np.diff(middles, axis=1), axis=2).sum(axis=1)
     lock = rng.integers(0, 5, S)
-    given = strands, length, middles, lengths, lock, rng.uniform(0, 1, S), rng.uniform(0.03, 0.2, S)
+    pull = rng.uniform([0, 0.03, 0, -0.02], [1, 0.2, 0.04, 0.02], (S, 4))
+    given = strands, length, middles, lengths, lock, pull
     assert off("drawn in", kernels.drawn_in(*given), groom_twins.drawn_in(*given)) < 1e-13
     with pytest.raises(ValueError, match="no such lock"):
         kernels.drawn_in(*given[:4], lock + 1, *given[5:])

@@ -18,7 +18,9 @@ def clumped(hair: Hair, op: Clump, ground: Ground, chance: Chance) -> Hair:
     """Strands drawn to their middles, more and more over `over`."""
     middles, lock = ground.middles[chance.name], hair.locks[chance.name]
     jitter = 1 - op.strength_jitter * chance.uniform(hair.index, _STRENGTH)
-    strength = np.where(lock == NOBODY, 0, ground.values(op.strength, hair) * jitter)
-    over = np.full(len(hair), op.over)
-    points = kernels.drawn_in(hair.points, hair.length, middles.points, middles.length, lock.clip(min=0), strength, over)
+    apart = (lock == NOBODY) | (hair.sections != middles.section[lock])
+    strength = np.where(apart, 0, ground.values(op.strength, hair) * jitter)
+    begin, lock = hair.free_from, lock.clip(min=0)
+    pull = np.stack([strength, np.full(len(hair), op.over), begin, middles.free_from[lock] - begin], axis=1)
+    points = kernels.drawn_in(hair.points, hair.length, middles.points, middles.length, lock, pull)
     return replace(hair, points=points)

@@ -10,7 +10,7 @@ from pipeline.config.schema import Fringe
 from pipeline.groom.style.chance import Chance
 from pipeline.groom.style.ground import Ground, Terrain, tangential
 from pipeline.groom.style.growth import Sprouts, grown, stretches
-from pipeline.groom.style.hair import STEP, Hair, Vectors, unit
+from pipeline.groom.style.hair import STEP, Hair, Vectors, set_apart, unit
 
 _UNEVEN, _TURN = 0, 1  # uses of chance
 _FRONT, _ROUND = (
@@ -61,7 +61,8 @@ def fringed(hair: Hair, op: Fringe, ground: Ground, chance: Chance) -> Hair:
     cut = np.maximum(kernels.first_outside(path, -higher, plane, False, -np.inf), _SHORTEST)
     points, length, comb = hair.points.copy(), hair.length.copy(), hair.comb.copy()
     points[which], length[which], comb[which] = kernels.shortened(path, cut, points.shape[1]), cut, ahead
-    return replace(hair, points=points, length=length, comb=comb)
+    section = set_apart(hair, which, chance.name)
+    return replace(hair, points=points, length=length, comb=comb, section=section)
 
 
 def in_fringe(root: Vectors, op: Fringe) -> NDArray[np.bool_]:

@@ -17,7 +17,7 @@ from pipeline.groom.head.distance import smoothstep
 from pipeline.groom.head_field import Field
 from pipeline.groom.style.chance import Chance
 from pipeline.groom.style.ground import Ground, tangential
-from pipeline.groom.style.hair import LONGEST, STEP, Hair, Ties, Vectors, unit
+from pipeline.groom.style.hair import LONGEST, STEP, Hair, Ties, Vectors, set_apart, unit
 
 _CHOSEN, _OWN = 0, 1  # uses of chance
 _CLEARANCE = 1.2e-3  # [m] of the lowest layer from the skin
@@ -70,7 +70,7 @@ def gathered(hair: Hair, op: Gather, ground: Ground, chance: Chance) -> Hair:
     rings = np.full((len(hair), 6), np.nan) if hair.ties is None else hair.ties.ring.copy()
     points[which] = kernels.shortened(np.ascontiguousarray(path), hair.length[which], points.shape[1])
     at[which], rings[which] = tied, np.concatenate([ring.middle, ring.axis])
-    return replace(hair, points=points, ties=Ties(at, rings))
+    return replace(hair, points=points, ties=Ties(at, rings), section=set_apart(hair, which, chance.name))
 
 
 def held_in_rings(points: Vectors, ties: Ties) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,8 @@ class Hair:
     """Of every clump operator, the clump (N,) that the strands belong to, `NOBODY` where to none."""
     ties: Ties | None = None
     """What ties strands together; None where nothing does."""
+    section: Index | None = None
+    """(N,) the part of the hair that strands were set apart as: clumps do not reach from one to another. None: all are one."""
 
     def __len__(self) -> int:
         return len(self.index)
@@ -62,6 +65,11 @@ class Hair:
         """Arc length (N,) [m] from which strands hang free: 0, or where they are tied."""
         return np.zeros(len(self)) if self.ties is None else self.ties.at
 
+    @property
+    def sections(self) -> Index:
+        """The section (N,) of every strand; 0 is what was not set apart."""
+        return np.zeros(len(self), np.int64) if self.section is None else self.section
+
     def lock(self, per: str | None) -> Index:
         """The clump (N,) of an operator that strands belong to; a strand in none is by itself."""
         return self.index if per is None else np.where(self.locks[per] == NOBODY, self.index, self.locks[per])
@@ -75,6 +83,17 @@ class Middles:
     """(M, K, 3) [m]"""
     length: Vectors
     """(M,) [m]"""
+    free_from: Vectors
+    """(M,) [m]"""
+    section: Index
+    """(M,)"""
+
+
+def set_apart(hair: Hair, which: Index, name: str) -> Index:
+    """The sections (N,) of hair of which some strands are now one of this name."""
+    section = hair.sections.copy()
+    section[which] = crc32(name.encode())
+    return section
 
 
 def bristles(root: Vectors, normal: Vectors) -> Vectors:

@@ -89,8 +89,8 @@ class Stack:
         """Middles, carried in chunks through the first so many operators."""
         parts = np.array_split(index, -(-len(index) // CHUNK))
         hair = [self._through(part, steps) for part in parts]
-        points, length = ([getattr(part, name) for part in hair] for name in ("points", "length"))
-        return Middles(np.concatenate(points), np.concatenate(length))
+        names = ("points", "length", "free_from", "sections")
+        return Middles(*(np.concatenate([getattr(part, name) for part in hair]) for name in names))
 
     def _through(self, index: Index, steps: int) -> Hair:
         hair = self._start(index)
