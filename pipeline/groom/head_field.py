@@ -37,6 +37,10 @@ class Field:
         """Distances (N,) [m] at points (N, 3)."""
         return self.sample(p)[0]
 
+    def traced(self, origin: Vectors, rays: Vectors, reach: float, steps: int) -> Vectors:
+        """Points (N, 3) [m] where rays (N, 3) from the origin leave the skin, traced inwards from `reach` [m]."""
+        return kernels.traced(self.native, origin, np.ascontiguousarray(rays, np.float64), reach, steps)
+
     def outside(self, points: Points, clearance: Vectors, rounds: int) -> tuple[Vectors, Vectors]:
         """Strands (N, P, 3) [m] pushed out to `clearance` (P,) [m] (-inf: stays), and how deep they were (N,) [m]."""
         return kernels.outside(self.native, np.ascontiguousarray(points, np.float64), clearance, rounds)

@@ -813,6 +813,9 @@ def outside(field: DistanceField, points: _F64, clearance: _F64, rounds: int) ->
     Points of infinite (negative) clearance stay; the depth (S,) [m] is the greatest of all points and rounds.
     """
 
+def traced(field: DistanceField, origin: _F64, rays: _F64, reach: float, steps: int) -> _F64:
+    """Points (N, 3) [m] where unit rays (N, 3) from `origin` (3,) leave the skin, traced inwards from `reach` [m] by spheres."""
+
 class Terrain:
     """What strands grow over: the wall, and the flow of the combing on a grid over the scalp's chart (grow.hpp)."""
 

@@ -170,6 +170,7 @@ static std::tuple<Numbers, Numbers> outside(const DistanceField &field, Strands 
                 Vec3<double> n;
                 sample<double>(field, out[j], d, n);
                 const Lanes<double> depth = maximum<double>(keep[j] - d, Lanes<double>{});
+                if (!any<double>(depth > 0)) break;
                 out[j] = out[j] + (depth * inverse_root<double>(dot(n, n) + 1e-300)) * n;
                 worst = maximum<double>(worst, depth);
             }
@@ -177,6 +178,32 @@ static std::tuple<Numbers, Numbers> outside(const DistanceField &field, Strands 
         scatter(&worst, deepest.data(), 1, index);
     });
     return {moved, deepest};
+}
+
+/// Where rays first meet the skin when they come from `reach` before their origin: sphere tracing.
+static Numbers traced(const DistanceField &field, Array<const double, 3> origin, Vectors rays, double reach, int steps) {
+    const size_t N = rays.shape(0);
+    auto out = new_array<double>({N, size_t(3)});
+    const Vec3<double> center = broadcast<double>(origin.data());
+    nb::gil_scoped_release release;
+    const int blocks = block_count<double>(int(N));
+#pragma omp parallel num_threads(threads_for(N))
+    {
+        Vec3<double> ray{}, x, gradient;
+#pragma omp for schedule(static, 256)
+        for (int b = 0; b < blocks; ++b) {
+            const BlockIndex<double> index(b, int(N));
+            gather(&ray, rays.data(), 1, index.strand);
+            Lanes<double> far = splat(reach), d;
+            for (int step = 0; step < steps; ++step) {
+                sample<double>(field, center + far * ray, d, gradient);
+                far -= d;
+            }
+            x = center + far * ray;
+            scatter(&x, out.data(), 1, index);
+        }
+    }
+    return out;
 }
 
 static Terrain make_terrain(const DistanceField &wall, Array<const double, 3> center, Array<const double, 3, 3> axes,
@@ -199,18 +226,18 @@ static Numbers grown(const Terrain &terrain, Vectors roots, Vectors first, Array
     require(count >= 2 && T * Grower::kStretch + 1 >= K, "grown: expected at least 2 points, and noise for all steps");
     auto out = new_array<double>({S, K, size_t(3)});
     nb::gil_scoped_release release;
-    const int blocks = block_count<double>(int(S));
+    const int blocks = block_count<float>(int(S));
 #pragma omp parallel num_threads(threads_for(S))
     {
-        Arena arena((K + T) * sizeof(Vec3<double>));
-        Vec3<double> *x = arena.take<Vec3<double>>(K), *wander = arena.take<Vec3<double>>(T), t{};
+        Arena arena((K + T) * sizeof(Vec3<float>));
+        Vec3<float> *x = arena.take<Vec3<float>>(K), *wander = arena.take<Vec3<float>>(T), t{};
 #pragma omp for schedule(dynamic, 16)
         for (int b = 0; b < blocks; ++b) {
-            const BlockIndex<double> index(b, int(S));
-            Lanes<double> row[10];
+            const BlockIndex<float> index(b, int(S));
+            Lanes<float> row[10];
             gather(x, roots.data(), 1, index.strand);
             gather(&t, first.data(), 1, index.strand);
-            gather<double>(row, growth.data(), 10, 10, index.strand);
+            gather<float>(row, growth.data(), 10, 10, index.strand);
             gather(wander, noise.data(), int(T), index.strand);
             const Growth how{row[0], row[1], row[2], row[3], {row[4], row[5], row[6]}, {row[7], row[8]}, row[9]};
             Grower(terrain, how).grow(x, int(K), t, wander);
@@ -232,6 +259,7 @@ void bind_groom(nb::module_ &m) {
     m.def("first_outside", nb::overload_cast<Strands, PerStrand, Array<const double, 4>, bool, double>(&first_outside), nb::arg("points"), nb::arg("margin"), nb::arg("shape"), nb::arg("ball"),
           nb::arg("hang"));
     m.def("outside", &outside, nb::arg("field"), nb::arg("points"), nb::arg("clearance"), nb::arg("rounds"));
+    m.def("traced", &traced, nb::arg("field"), nb::arg("origin"), nb::arg("rays"), nb::arg("reach"), nb::arg("steps"));
     nb::class_<Terrain>(m, "Terrain")
         .def("__init__",
              [](Terrain *self, const DistanceField &wall, Array<const double, 3> center, Array<const double, 3, 3> axes,

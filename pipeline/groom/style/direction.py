@@ -35,7 +35,9 @@ def directed(hair: Hair, op: Direction, ground: Ground, chance: Chance) -> Hair:
         length=hair.length,
         wander=np.stack(wander, axis=1),
     )
-    points = cut_to(grown(own, terrain, op.lift_over, steps), hair.length, hair.points.shape[1])
+    points = grown(own, terrain, op.lift_over, steps)
+    if hair.points.shape[1] > 2:
+        points = cut_to(points, hair.length, hair.points.shape[1])
     return replace(hair, points=points, comb=comb)
 
 

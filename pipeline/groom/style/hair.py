@@ -1,7 +1,7 @@
 """What style operators work on: some strands, and what is known about each of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 from zlib import crc32
 
@@ -97,8 +97,15 @@ def set_apart(hair: Hair, which: Index, name: str) -> Index:
 
 
 def bristles(root: Vectors, normal: Vectors) -> Vectors:
-    """Points (N, UNCUT, 3) [m] of hair that nobody has styled: straight out of the skin."""
-    return root[:, None] + np.linspace(0, LONGEST, UNCUT)[:, None] * normal[:, None]
+    """Root and tip (N, 2, 3) [m], `LONGEST` apart, of hair that nobody has styled: straight out of the skin."""
+    return np.stack([root, root + LONGEST * normal], axis=1)
+
+
+def divided(hair: Hair) -> Hair:
+    """Hair in points that can be moved: `UNCUT` of them, where there are but root and tip."""
+    if hair.points.shape[1] > 2:
+        return hair
+    return replace(hair, points=cut_to(hair.points, hair.length, UNCUT))
 
 
 def cut_to(points: Vectors, length: Vectors, count: int) -> Vectors:

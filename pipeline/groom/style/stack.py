@@ -30,7 +30,7 @@ from pipeline.groom.style.fringe import fringed
 from pipeline.groom.style.frizz import frizzed
 from pipeline.groom.style.gather import gathered
 from pipeline.groom.style.ground import Ground
-from pipeline.groom.style.hair import Hair, Index, Middles
+from pipeline.groom.style.hair import Hair, Index, Middles, divided
 from pipeline.groom.style.lengths import lengthened
 from pipeline.groom.style.locks import Locks
 from pipeline.groom.style.trim import trimmed
@@ -52,6 +52,9 @@ OPERATORS: dict[type[Operator], Callable[[Hair, Any, Ground, Chance], Hair]] = {
     Gather: gathered,
     Fringe: fringed,
 }
+
+
+GROW_ANEW = (Direction, Lengths)  # operators that take no notice of points between root and tip
 
 
 class Stack:
@@ -97,5 +100,7 @@ class Stack:
         locks = {name: found.of(index) for name, found in self._locks.items()}
         hair = replace(hair, locks=locks)
         for name, op in self._steps[:steps]:
+            if not isinstance(op, GROW_ANEW):
+                hair = divided(hair)
             hair = OPERATORS[type(op)](hair, op, self._ground, Chance(self._ground.seed, name))
-        return hair
+        return divided(hair)
