@@ -32,6 +32,7 @@ _STEP = 0.008  # of the chart: pieces of a parting, 1.6 mm
 _HEIGHTS = 0.3  # what heights count in D^2
 _SOFT = 1e-3  # [m] e
 _APART = 0.015  # of the chart: roots look the flow up as if they stood this far from a parting, 3 mm
+_NEAR = 0.01  # [m] from a parting: that far no standoff reaches
 _APART_FROM = 0.15  # of the chart: but less and less this near to an end of it
 _CROWDING, _CROWDED = 0.7, 0.015  # more roots at a parting than elsewhere, over this distance [m]
 _SWIRL, _SWIRLED = 1.1, 0.018  # [rad] turn about an end of a parting, [m] how far it reaches
@@ -69,6 +70,13 @@ class Combing:
         found = np.zeros_like(uv)
         if not len(self.segments):
             return found
+        near = np.flatnonzero(self._at(uv)[:, 3] < _NEAR)
+        found[near] = self._standing_off(uv[near])
+        return found
+
+    def _standing_off(self, uv: Vectors) -> Vectors:
+        """The standoffs (N, 2) of chart points by the distance of each from every segment."""
+        found = np.zeros_like(uv)
         a, along = self.segments[:, 0], self.segments[:, 1] - self.segments[:, 0]
         squares = np.maximum((along**2).sum(axis=1), 1e-300)
         for first in range(0, len(uv), _BLOCK):

@@ -31,14 +31,23 @@ class Field:
 
     def sample(self, p: Points) -> tuple[Vectors, Vectors]:
         """Distances (N,) [m] and unit outward normals (N, 3) at points (N, 3)."""
-        return kernels.distance(self._native, np.ascontiguousarray(p, np.float64))
+        return kernels.distance(self.native, np.ascontiguousarray(p, np.float64))
 
     def distance(self, p: Points) -> Vectors:
         """Distances (N,) [m] at points (N, 3)."""
         return self.sample(p)[0]
 
+    def traced(self, origin: Vectors, rays: Vectors, reach: float, steps: int) -> Vectors:
+        """Points (N, 3) [m] where rays (N, 3) from the origin leave the skin, traced inwards from `reach` [m]."""
+        return kernels.traced(self.native, origin, np.ascontiguousarray(rays, np.float64), reach, steps)
+
+    def outside(self, points: Points, clearance: Vectors, rounds: int) -> tuple[Vectors, Vectors]:
+        """Strands (N, P, 3) [m] pushed out to `clearance` (P,) [m] (-inf: stays), and how deep they were (N,) [m]."""
+        return kernels.outside(self.native, np.ascontiguousarray(points, np.float64), clearance, rounds)
+
     @property
-    def _native(self) -> kernels.DistanceField:
+    def native(self) -> kernels.DistanceField:
+        """The field as kernels take it."""
         found = self.__dict__.get("_kernel")
         if found is None:
             found = kernels.DistanceField(self.values, self.origin, self.spacing)

@@ -63,7 +63,7 @@ class Head:
     arrays: Mapping[str, NDArray[np.float32]] = default(default_factory=dict)
     """Painted numbers (V,) on the points of the skin, by name."""
 
-    @property
+    @cached_property
     def fitted_field(self) -> Field:
         """Distance to the skin in fitted coordinates."""
         return self.field.rescaled(self.scale, self.offset)
@@ -80,7 +80,7 @@ class Head:
 
     def on_skin(self, uv: Points) -> NDArray[np.float64]:
         """Points (N, 3) of the skin at chart points (N, 2), in fitted coordinates."""
-        return scalp.on_skin(self.fitted_field.distance, uv)
+        return scalp.on_skin(self.fitted_field, uv)
 
     def density(self, p: Points) -> Points:
         """Relative density of roots at fitted points on the skin."""

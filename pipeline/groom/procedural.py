@@ -19,10 +19,11 @@ from pipeline.groom.heads import Head
 from pipeline.groom.partings import partings_of
 from pipeline.groom.repairs import pushed_out
 from pipeline.groom.roots import place_roots
+from pipeline.groom.style.gather import held_in_rings
 from pipeline.groom.style.ground import Ground, Terrain, tangential
 from pipeline.groom.style.hair import LONGEST, Hair, bristles, unit
 from pipeline.groom.style.stack import CHUNK, Stack
-from pipeline.strands.held import held_ends
+from pipeline.strands.held import HEAD, held_ends
 from pipeline.strands.partings import Neighbours
 from pipeline.strands.random import hashed
 from pipeline.strands.resample import resampled
@@ -64,12 +65,16 @@ class Style:
     def strands(self, first: int, count: int = CHUNK) -> Strands:
         """Up to `count` strands from `first` on, in world coordinates."""
         index = np.arange(first, min(first + count, len(self.roots)))
-        points = self.stack.strands(index).points
+        hair = self.stack.strands(index)
+        points = hair.points
         points[:, 0] = self.roots[index]
         points = self._evened(points)
+        held = held_ends(np.tile([2, 0], (len(index), 1)), self.groom.points)
+        if hair.ties is not None:
+            held[held_in_rings(points, hair.ties)] = HEAD
         return Strands(
             points=self.head.to_world(points).astype(np.float32),
-            held=held_ends(np.tile([2, 0], (len(index), 1)), self.groom.points),
+            held=held,
             normal=self.normals[index].astype(np.float32),
             key=hashed(self.seed, index, _KEY),
         )
@@ -92,14 +97,9 @@ class Style:
 
     def _outside(self, points: Vectors) -> Vectors:
         """Points below the skin pushed out of it; roots stay on it."""
-        lowest = np.full(points[:, 1:].shape[:2], _CLEARANCE)
-        lowest[:, 0] *= 0.5
-        for _ in range(2):
-            p = points[:, 1:].reshape(-1, 3)
-            d, n = self.terrain.skin.sample(p)
-            depth = np.maximum(lowest.ravel() - d, 0)
-            points[:, 1:] = (p + depth[:, None] * n).reshape(points[:, 1:].shape)
-        return points
+        clearance = np.full(points.shape[1], _CLEARANCE)
+        clearance[:2] = -np.inf, 0.5 * _CLEARANCE
+        return self.terrain.skin.outside(points, clearance, rounds=2)[0]
 
 
 def _density(head: Head, combing: Combing, p: Vectors) -> Vectors:

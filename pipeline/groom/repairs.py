@@ -83,18 +83,15 @@ def pushed_out(points: NDArray[np.float64], skin: Field) -> tuple[NDArray[np.flo
     points = points.copy()
     through = np.zeros(len(points), bool)
     rows = np.arange(len(points))
+    clearance = np.full(points.shape[1], _CLEARANCE)
+    clearance[:2] = -np.inf
     for _ in range(4):  # equal spacing moves points back a little
-        free = points[rows, 2:].reshape(-1, 3)
-        distance, normal = skin.sample(free)
-        depth = np.maximum(_CLEARANCE - distance, 0)
-        moved = free + depth[:, None] * normal
-        points[rows, 2:] = moved.reshape(len(rows), -1, 3)
-        depth = depth.reshape(len(rows), -1).max(axis=1)
+        moved, depth = skin.outside(points[rows], clearance, rounds=1)
         through[rows] |= depth > _CLEARANCE
-        rows = rows[depth > 0]
+        rows, moved = rows[depth > 0], moved[depth > 0]
         if not len(rows):
             break
-        points[rows] = resampled(points[rows], points.shape[1])
+        points[rows] = resampled(moved, points.shape[1])
     return points, through
 
 

@@ -6,11 +6,13 @@ So strand i depends on the seed and i alone, not on the count.
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline import kernels
 from pipeline.errors import InputError
 from pipeline.groom.head import scalp
 from pipeline.groom.head_field import Field
@@ -34,15 +36,17 @@ def place_roots(
     """
     found: list[NDArray[np.float64]] = []
     first = total = 0
-    while total < count:
-        index = np.arange(first, first + min(_BATCH, 8 * count + 4096))
-        p = _candidates(index, seed, skin, density)
-        found.append(p)
-        first, total = int(index[-1]) + 1, total + len(p)
-        if first > 10_000 and total < first / 10_000:
-            raise InputError(
-                "scene.head: found no scalp on this mesh; check scene.up_axis and scene.unit_scale"
-            )
+    batch = min(_BATCH, 8 * count + 4096)
+    with ThreadPoolExecutor(kernels.threads()) as pool:
+        while total < count:
+            begins = first + batch * np.arange(kernels.threads() if batch == _BATCH else 1)
+            parts = [pool.submit(_candidates, k + np.arange(batch), seed, skin, density) for k in begins]
+            found.extend(part.result() for part in parts)
+            first, total = int(begins[-1]) + batch, sum(len(p) for p in found)
+            if first > 10_000 and total < first / 10_000:
+                raise InputError(
+                    "scene.head: found no scalp on this mesh; check scene.up_axis and scene.unit_scale"
+                )
     roots = np.concatenate(found)[:count]
     for _ in range(2):
         d, n = skin.sample(roots)
@@ -55,7 +59,7 @@ def _candidates(
 ) -> NDArray[np.float64]:
     uv = 2 * ((0.5 + index[:, None] * np.array([1 / _PLASTIC, 1 / _PLASTIC**2])) % 1) - 1
     inside = (uv**2).sum(1) < 1
-    index, p = index[inside], scalp.on_skin(skin.distance, _DISC * uv[inside])
+    index, p = index[inside], scalp.on_skin(skin, _DISC * uv[inside])
     ray = p - scalp.chart().center
     squares = (ray**2).sum(1)
     cosine = np.maximum((skin.sample(p)[1] * ray).sum(1) / np.sqrt(squares), 0.43)

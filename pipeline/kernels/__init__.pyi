@@ -814,6 +814,7 @@ class Raster:
         """
 
 # --- groom: random numbers, equal spacing, growth, curls, clumps (random, smooth_curve, grow, coil, locks .hpp) -------
+# --- groom: random numbers, equal spacing, growth, curls, clumps (random, smooth_curve, grow, coil, polylines .hpp) -------
 #
 # Points (S, P, 3) float64 [m] are strands root first, at equal parts of their `length` (S,) [m] unless told otherwise;
 # every result is new, and that of a strand does not depend on the strands beside it. ValueError for other shapes.
@@ -830,8 +831,15 @@ def resampled(points: _F64, count: int) -> _F64:
     Root and tip stay. Segments of a strand agree to 1e-6 of their length, unless it turns back within one segment.
     """
 
-def shortened(points: _F64, step: float, length: _F64, count: int) -> _F64:
-    """Points (S, count, 3) [m] at equal parts of the first `length` (S,) [m] of polylines (S, K, 3) of steps `step` [m]."""
+def shortened(points: _F64, length: _F64, count: int) -> _F64:
+    """Points (S, count, 3) [m] at equal parts of the first `length` (S,) [m] of polylines (S, K, 3) of any spacing."""
+
+def first_outside(points: _F64, margin: _F64, shape: _F64, ball: bool, hang: float) -> _F64:
+    """Arc length (S,) [m] at which polylines (S, K, 3) first come outside by more than `margin` (S,) [m].
+
+    Of the half space n . x + d <= 0, `shape` (n, d), or of a sphere, `shape` (centre, radius). All of it where a strand
+    does not. Below the height `hang` [m] a strand is measured as if it hung straight down; -inf: as it lies.
+    """
 
 def coiled(points: _F64, reference: _F64, length: _F64, coil: _F64) -> _F64:
     """Points (S, P, 3) [m] moved to a helix about each strand, in frames of least rotation.
@@ -854,18 +862,13 @@ def shaken(points: _F64, length: _F64, sines: _F64, rise: _F64) -> _F64:
     """
 
 def drawn_in(
-    points: _F64,
-    length: _F64,
-    middles: _F64,
-    middle_length: _F64,
-    lock: NDArray[np.int64],
-    strength: _F64,
-    over: _F64,
+    points: _F64, length: _F64, middles: _F64, middle_length: _F64, lock: NDArray[np.int64], pull: _F64
 ) -> _F64:
-    """Points (S, P, 3) [m] moved towards the point of their lock's middle at the same arc length s.
+    """Points (S, P, 3) [m] moved towards points of the middle (M, Q, 3) that `lock` (S,) tells, of middle_length (M,) [m].
 
-    By strength (S,) * smoothstep(s / over (S,) [m]). The lock (S,) tells the middle (M, Q, 3) of length
-    middle_length (M,) [m]; a middle that is too short goes straight on.
+    `pull` (S, 4) is strength, over, begin and shift [m]: the point at arc length s moves by the part
+    strength * smoothstep((s - begin) / over) of the way to the middle's at s + shift. A middle that is too short goes
+    straight on.
     """
 
 def outside(field: DistanceField, points: _F64, clearance: _F64, rounds: int) -> tuple[_F64, _F64]:
@@ -873,6 +876,31 @@ def outside(field: DistanceField, points: _F64, clearance: _F64, rounds: int) ->
 
     Points of infinite (negative) clearance stay; the depth (S,) [m] is the greatest of all points and rounds.
     """
+
+def traced(field: DistanceField, origin: _F64, rays: _F64, reach: float, steps: int) -> _F64:
+    """Points (N, 3) [m] where unit rays (N, 3) from `origin` (3,) leave the skin, traced inwards from `reach` [m] by spheres."""
+
+class Terrain:
+    """What strands grow over: the wall, and the flow of the combing on a grid over the scalp's chart (grow.hpp)."""
+
+    def __init__(
+        self, wall: DistanceField, center: _F64, axes: _F64, grid: NDArray[np.float32], step: float
+    ) -> None:
+        """The chart by its centre (3,) [m] and axes (3, 3), the grid (n, n, 4) of flow x, y, z, and steps of `step` [m]."""
+
+    def grown(self, roots: _F64, first: _F64, growth: _F64, noise: _F64, count: int) -> _F64:
+        """Polylines (S, count, 3) [m] of equal steps from the roots (S, 3) and first directions (S, 3).
+
+        Args:
+            roots: (S, 3) float64 [m].
+            first: (S, 3), unit.
+            growth: (S, 10): height of the layer [m], arc length to reach it [m], bend [m], comb [m], what is added to the
+                flow x, y, z, what is added to the chart point where the flow is looked up u, v, and length [m]: beyond it
+                a strand goes straight on.
+            noise: (S, T, 3): added to the target direction, each for 8 steps.
+            count: points of a polyline.
+
+        """
 
 class Shape:
     """Signed distance to parts joined in the order in which they are added; see parts.hpp for the formulas.

@@ -11,8 +11,8 @@
 namespace ringlet {
 
 /// 0 below 0, 1 above 1, cubic between.
-RINGLET_INLINE Lanes<double> smoothstep(Lanes<double> t) {
-    t = minimum<double>(maximum<double>(t, Lanes<double>{}), splat(1.0));
+template <class Real> RINGLET_INLINE Lanes<Real> smoothstep(Lanes<Real> t) {
+    t = minimum<Real>(maximum<Real>(t, Lanes<Real>{}), splat(Real(1)));
     return t * t * (3 - 2 * t);
 }
 
@@ -21,8 +21,9 @@ RINGLET_INLINE Vec3<double> mirrored(Vec3<double> v, Vec3<double> normal) {
     return v - scale * normal;
 }
 
-RINGLET_INLINE Vec3<double> direction(Vec3<double> v) {
-    return (1 / maximum<double>(square_root<double>(dot(v, v)), splat(1e-12))) * v;
+/// The unit vector along v; 0 of 0.
+template <class Real> RINGLET_INLINE Vec3<Real> direction(Vec3<Real> v) {
+    return inverse_root<Real>(maximum<Real>(dot(v, v), splat(Real(1e-24)))) * v;
 }
 
 /// Tangent at point j of P: central differences, one-sided at the ends.
@@ -41,7 +42,7 @@ inline void wind(const Vec3<double> *x, int P, Vec3<double> reference, Lanes<dou
     for (int j = 0; j < P; ++j) {
         const Lanes<double> s = step * double(j);
         const SineCosine turn = of_turns(coil.phase + s / coil.pitch);
-        const Lanes<double> amplitude = coil.radius * smoothstep((s - coil.onset) / coil.ramp);
+        const Lanes<double> amplitude = coil.radius * smoothstep<double>((s - coil.onset) / coil.ramp);
         out[j] = x[j] + (amplitude * turn.cosine) * u + (amplitude * coil.minor * turn.sine) * cross(t, u);
         if (j + 1 == P) break;
         const Vec3<double> chord = x[j + 1] - x[j], next = tangent(x, j + 1, P);
@@ -62,7 +63,7 @@ inline void shake(Vec3<double> *x, int P, Lanes<double> length, const Sine *sine
         const Lanes<double> s = step * double(j);
         Vec3<double> sum{};
         for (int k = 0; k < K; ++k) sum = sum + of_turns(s / sines[k].period + sines[k].phase).sine * sines[k].amplitude;
-        x[j] = x[j] + smoothstep(s / rise) * sum;
+        x[j] = x[j] + smoothstep<double>(s / rise) * sum;
     }
 }
 

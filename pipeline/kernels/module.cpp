@@ -35,6 +35,8 @@ void bind_expand(nb::module_ &m);
 void bind_groom(nb::module_ &m);
 void bind_parts(nb::module_ &m);
 void bind_partings(nb::module_ &m);
+void bind_groom(nb::module_ &m);
+void bind_parts(nb::module_ &m);
 void bind_peak(nb::module_ &m);
 void bind_raster(nb::module_ &m);
 void bind_statics(nb::module_ &m);

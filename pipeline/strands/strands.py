@@ -48,7 +48,8 @@ class Strands:
     @property
     def length(self) -> NDArray[np.float32]:
         """(S,) float32 [m]: arc length."""
-        return np.asarray(np.linalg.norm(np.diff(self.points, axis=1), axis=2).sum(axis=1))
+        segments = np.diff(self.points, axis=1)
+        return np.asarray(np.sqrt(np.einsum("spk,spk->sp", segments, segments)).sum(axis=1))
 
     @property
     def spacing(self) -> NDArray[np.float32]:

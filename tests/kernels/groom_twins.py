@@ -1,9 +1,17 @@
 """numpy twins of the grooming kernels: helices in frames of least rotation, sines, locks, growth."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline import kernels
+from pipeline.strands.spacing import arc_length
+
 Vectors = NDArray[np.float64]
+Chart = Callable[[Vectors], Vectors]
+
+STEP = 4e-3  # [m]
 
 
 def smoothstep(t: Vectors) -> Vectors:
@@ -38,17 +46,91 @@ def drawn_in(
     middles: Vectors,
     middle_length: Vectors,
     lock: NDArray[np.int64],
-    strength: Vectors,
-    over: Vectors,
+    pull: Vectors,
 ) -> Vectors:
+    strength, over, begin, shift = pull.T[:, :, None]
     along = np.linspace(0, 1, points.shape[1]) * length[:, None]
-    target = at(middles, along / middle_length[lock][:, None] * (middles.shape[1] - 1), lock)
-    weight = strength[:, None] * smoothstep(along / over[:, None])
+    target = at(middles, (along + shift) / middle_length[lock][:, None] * (middles.shape[1] - 1), lock)
+    weight = strength * smoothstep((along - begin) / over)
     return points + weight[..., None] * (target - points)
 
 
-def shortened(points: Vectors, step: float, length: Vectors, count: int) -> Vectors:
-    return at(points, np.linspace(0, 1, count) * length[:, None] / step, np.arange(len(points)))
+def shortened(points: Vectors, length: Vectors, count: int) -> Vectors:
+    along = arc_length(points)
+    place = [
+        np.interp(np.linspace(0, 1, count) * whole, own, np.arange(points.shape[1]))
+        for whole, own in zip(length, along, strict=True)
+    ]
+    return at(points, np.array(place), np.arange(len(points)))
+
+
+def first_outside(points: Vectors, margin: Vectors, shape: Vectors, round_: bool, hang: float) -> Vectors:
+    along, p = arc_length(points), points.copy()
+    below = p[..., 1] < hang
+    hung = below.any(axis=1)[:, None] & (along >= np.where(below, along, np.inf).min(axis=1)[:, None])
+    start = np.where(below, along, np.inf).min(axis=1)[:, None]
+    straight = np.where(hung, hang - (along - np.where(np.isfinite(start), start, 0)), 0)
+    p[..., 1] = np.where(hung, np.minimum(p[..., 1], straight), p[..., 1])
+    from_shape = np.linalg.norm(p - shape[:3], axis=2) - shape[3] if round_ else p @ shape[:3] + shape[3]
+    outside = from_shape - margin[:, None]
+    out = outside > 0
+    after, row = np.maximum(out.argmax(axis=1), 1), np.arange(len(p))
+    a, b = outside[row, after - 1], outside[row, after]
+    part = np.clip(-a / np.maximum(b - a, 1e-9), 0, 1)
+    crossing = along[row, after - 1] + part * (along[row, after] - along[row, after - 1])
+    return np.where(out.any(axis=1), crossing, along[:, -1])
+
+
+def grown(
+    wall: kernels.DistanceField,
+    chart: Chart,
+    grid: NDArray[np.float32],
+    roots: Vectors,
+    first: Vectors,
+    growth: Vectors,
+    wander: Vectors,
+    steps: int,
+) -> Vectors:
+    height, over, bend, comb = growth.T[:4]
+    sweep, standoff = growth[:, 4:7], growth[:, 7:9]
+    p, t, points = roots, first, [roots]
+    for k in range(1, steps + 1):
+        s = k * STEP
+        d, m = kernels.distance(wall, p)
+        sunk = smoothstep((-0.07 - p[:, 1]) / 0.05)
+        layer = 0.8e-3 + height * smoothstep(s / over) * (1 - 0.9 * sunk)
+        fade = np.exp(-s / comb)[:, None]
+        combed = unit(tangential(bilinear(grid, chart(p) + standoff), m))
+        flow = unit(combed + tangential(sweep, m))
+        target = unit(fade * flow + (1 - fade) * np.array([0, -1, 0]) + wander[:, (k - 1) // 8])
+        dive = np.minimum(dot(target, m), 0) * smoothstep(1.5 - (d - layer) / 0.006)[:, None]
+        target = unit(target - dive * m + m * np.clip((layer - d) / bend, 0, 0.8)[:, None])
+        t = unit(t + (target - t) * np.minimum(STEP / bend, 1)[:, None])
+        ahead, n = kernels.distance(wall, p + STEP * t)
+        lowest = np.minimum(layer, 0.8e-3 + 0.25 * s)
+        t = unit(STEP * t + 0.6 * np.maximum(lowest - ahead, 0)[:, None] * n)
+        p = p + STEP * t
+        points.append(p)
+    return np.stack(points, axis=1)
+
+
+def bilinear(grid: NDArray[np.float32], uv: Vectors) -> Vectors:
+    last = grid.shape[0] - 1
+    place = np.clip((uv + 1) * (last / 2), 0, last - 1e-9)
+    i = place.astype(np.int64)
+    u, v = (place - i).T[..., None]
+    g = grid.astype(np.float64)[..., :3]
+    low = g[i[:, 0], i[:, 1]] * (1 - v) + g[i[:, 0], i[:, 1] + 1] * v
+    high = g[i[:, 0] + 1, i[:, 1]] * (1 - v) + g[i[:, 0] + 1, i[:, 1] + 1] * v
+    return low * (1 - u) + high * u
+
+
+def tangential(v: Vectors, n: Vectors) -> Vectors:
+    return v - dot(v, n) * n
+
+
+def unit(v: Vectors) -> Vectors:
+    return v / np.maximum(np.sqrt(dot(v, v)), 1e-12)
 
 
 def at(points: Vectors, place: Vectors, which: NDArray[np.int64]) -> Vectors:

@@ -107,18 +107,68 @@ def test_sines_are_those_of_their_twin(rng: np.random.Generator, strands: Vector
 
 def test_locks_are_those_of_their_twin(rng: np.random.Generator, strands: Vectors, length: Vectors) -> None:
     """Middles of other counts of points, some of them too short."""
-    middles = groom_twins.shortened(strands, 0.01, rng.uniform(0.05, 0.3, S), 19)[:5]
+    middles = groom_twins.shortened(strands, rng.uniform(0.05, 0.15, S), 19)[:5]
     lengths = np.linalg.norm(np.diff(middles, axis=1), axis=2).sum(axis=1)
     lock = rng.integers(0, 5, S)
-    given = strands, length, middles, lengths, lock, rng.uniform(0, 1, S), rng.uniform(0.03, 0.2, S)
+    pull = rng.uniform([0, 0.03, 0, -0.02], [1, 0.2, 0.04, 0.02], (S, 4))
+    given = strands, length, middles, lengths, lock, pull
     assert off("drawn in", kernels.drawn_in(*given), groom_twins.drawn_in(*given)) < 1e-13
     with pytest.raises(ValueError, match="no such lock"):
         kernels.drawn_in(*given[:4], lock + 1, *given[5:])
 
 
 def test_shortened_strands_are_those_of_their_twin(rng: np.random.Generator, strands: Vectors) -> None:
-    given = strands, 0.008, rng.uniform(0.01, 0.19, S), 33
+    given = strands, rng.uniform(0.01, 0.19, S), 33
     assert off("shortened", kernels.shortened(*given), groom_twins.shortened(*given)) < 1e-13
+
+
+@pytest.mark.parametrize(
+    ("shape", "is_round", "hang"),
+    [
+        ((0.1, -1.0, 0.05, -0.09), False, -np.inf),
+        ((0.0, -1.0, 0.0, -0.12), False, -0.05),
+        ((0, -0.02, 0, 0.08), True, -np.inf),
+    ],
+)
+def test_strands_are_cut_where_their_twins_are(
+    rng: np.random.Generator, strands: Vectors, shape: tuple[float, ...], is_round: bool, hang: float
+) -> None:
+    given = strands, rng.uniform(-0.02, 0.02, S), np.array(shape), is_round, hang
+    found, expected = kernels.first_outside(*given), groom_twins.first_outside(*given)
+    whole = np.linalg.norm(np.diff(strands, axis=1), axis=2).sum(axis=1)
+    print(f"{(expected < whole - 1e-9).sum()} of {S} are cut")
+    assert (expected < whole - 1e-9).any()
+    assert off("cut", found, expected) < 1e-12
+
+
+def test_strands_grow_as_their_twins_do(rng: np.random.Generator) -> None:
+    """Over a ball of 9 cm, combed along circles; what differs are sums of another order, which growth enlarges."""
+    n, h = 61, 6e-3
+    axis = h * (np.arange(n) - n // 2)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    values = (np.sqrt(x**2 + y**2 + z**2) - 0.09).astype(np.float32)
+    wall = kernels.DistanceField(values, np.full(3, axis[0]), h)
+    grid = rng.normal(size=(33, 33, 4)).astype(np.float32)
+    center, axes = np.array([0, 0.01, 0]), np.array([[-1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]])
+
+    def chart(p: Vectors) -> Vectors:
+        q = (p - center) @ axes.T
+        q /= np.linalg.norm(q, axis=1, keepdims=True)
+        return q[:, :2] / np.sqrt(2 * (1 + q[:, 2:]))
+
+    normals = rng.normal([0, 2, 0], 1, (S, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    roots, first = 0.09 * normals, groom_twins.unit(normals + 0.5 * rng.normal(size=(S, 3)))
+    low = [0.002, 0.05, 0.02, 0.04, -0.3, -0.3, -0.3, -0.05, -0.05, 0.5]
+    high = [0.02, 0.1, 0.03, 0.08, 0.3, 0.3, 0.3, 0.05, 0.05, 0.5]
+    growth, wander = rng.uniform(low, high, (S, 10)), 0.05 * rng.normal(size=(S, 5, 3))
+    terrain = kernels.Terrain(wall, center, axes, grid, groom_twins.STEP)
+    found = terrain.grown(roots, first, growth, wander, 41)
+    expected = groom_twins.grown(wall, chart, grid, roots, first, growth, wander, 40)
+    steps = np.linalg.norm(np.diff(found, axis=1), axis=2)
+    print(f"steps differ from 4 mm by {np.abs(steps - groom_twins.STEP).max():.1e} m")
+    assert off("grown", found, expected) < 1e-5
+    assert np.abs(steps - groom_twins.STEP).max() < 1e-7
 
 
 def test_strands_that_are_pushed_out_keep_their_clearance(strands: Vectors) -> None:

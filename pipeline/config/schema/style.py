@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from pipeline.config.schema.base import Fraction, Position, Section
+from pipeline.config.schema.base import Fraction, Position, Section, Vector
 from pipeline.config.schema.varying import VaryingAngle, VaryingFraction, VaryingLength, VaryingNumber
 from pipeline.config.units import Angle, Length
 
@@ -181,6 +181,63 @@ class Flyaway(Operator):
     """Arc length over which they part from the others."""
 
 
+class Bend(Operator):
+    op: Literal["bend"]
+    """Strands turn over a range of their length and stay turned beyond it."""
+    angle: VaryingAngle = 0.8
+    """By how much they turn; negative is away from `towards`."""
+    jitter: Fraction = 0.2
+    """Relative spread of the angle from strand to strand."""
+    measured_from: Literal["root", "tip"] = "tip"
+    """The end of the strand from which the range is measured; a tied strand's root is where it is tied."""
+    start: Annotated[Length, Field(ge=0)] = 0.0
+    """Arc length from that end to the range."""
+    over: Positive = 0.05
+    """Length of the range."""
+    towards: Literal["head"] | Vector = "head"
+    """What strands turn towards: the head beside them, or a direction."""
+
+
+class Gather(Operator):
+    op: Literal["gather"]
+    """Strands are combed over the scalp to a ring, pulled through it and held there by the head; a tail falls from it."""
+    tie: Position = (0.0, 0.075, -0.095)
+    """Where the ring sits, on the mannequin: above the point of the skin nearest to this one."""
+    radius: Positive = 0.011
+    """Radius of the ring: all strands pass within it."""
+    height: Annotated[Length, Field(ge=0)] = 0.012
+    """How high above the skin the ring sits."""
+    axis: Vector | None = None
+    """Direction in which the tail leaves; unset, straight away from the skin."""
+    fraction: VaryingFraction = 1.0
+    """Which strands are gathered; a formula of 0 and 1 takes a part of the scalp, for half of the hair or for two tails."""
+    rise: Annotated[float, Field(ge=1)] = 2.0
+    """How much strands go up before they go on to the ring; 1 is the straight way."""
+    fall: Positive = 0.06
+    """Arc length after which gravity bends the tail down."""
+    spread: Annotated[Angle, Field(ge=0, lt=1.5)] = 0.3
+    """Angle at which the tail's outermost strands leave it."""
+
+
+class Fringe(Operator):
+    op: Literal["fringe"]
+    """Strands rooted behind the front hairline fall forward over the forehead, and are cut at a height."""
+    width: Positive = 0.09
+    """Breadth of the region at the hairline; it narrows to a point towards the crown."""
+    depth: Positive = 0.045
+    """How far the region reaches back from the hairline."""
+    height: Length = 0.042
+    """No strand of the region reaches below this height (y)."""
+    uneven: Annotated[Length, Field(ge=0)] = 0.003
+    """How much higher single strands end."""
+    sideways: float = 0.0
+    """Sideways part of their direction; positive is to the head's left."""
+    lift: Annotated[Length, Field(ge=0)] = 0.008
+    """How high above the skin the outermost layer lies."""
+    bend: Positive = 0.012
+    """Arc length over which strands turn down."""
+
+
 def _op(value: Any) -> str:
     op = value.get("op", "") if isinstance(value, dict) else getattr(value, "op", "")
     return f"({op})"
@@ -194,7 +251,10 @@ AnyOperator = Annotated[
     | Annotated[Curl, Tag("(curl)")]
     | Annotated[Wave, Tag("(wave)")]
     | Annotated[Frizz, Tag("(frizz)")]
-    | Annotated[Flyaway, Tag("(flyaway)")],
+    | Annotated[Flyaway, Tag("(flyaway)")]
+    | Annotated[Bend, Tag("(bend)")]
+    | Annotated[Gather, Tag("(gather)")]
+    | Annotated[Fringe, Tag("(fringe)")],
     Discriminator(_op),
 ]
 StyleName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]

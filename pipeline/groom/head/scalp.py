@@ -4,7 +4,6 @@ The scalp is star-shaped about the chart's centre, so a chart point is a ray fro
 is 4 r^2 / cos(normal, ray).
 """
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -14,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.groom.head.distance import fold_parts, smoothstep
 from pipeline.groom.head.table import load_table, part
+from pipeline.groom.head_field import Field
 from pipeline.strands.chart import Chart
 
 Points = NDArray[np.floating[Any]]
@@ -41,14 +41,9 @@ def density(p: Points) -> Points:
     return smoothstep(_margin(p) / load_table()["scalp"]["fade"]) * smoothstep(clear / _EAR_CLEARANCE)
 
 
-def on_skin(distance: Callable[[Points], Points], uv: Points) -> NDArray[np.float64]:
+def on_skin(skin: Field, uv: Points) -> NDArray[np.float64]:
     """Points (N, 3) of the skin at chart points (N, 2), by sphere tracing from outside; fitted coordinates."""
-    head = chart()
-    ray = head.rays(uv)
-    reach = np.full(len(ray), _OUTSIDE)
-    for _ in range(_STEPS):
-        reach -= distance(head.center + reach[:, None] * ray)
-    return np.asarray(head.center + reach[:, None] * ray)
+    return skin.traced(chart().center, chart().rays(uv), _OUTSIDE, _STEPS)
 
 
 def _margin(p: Points) -> Points:

@@ -29,7 +29,7 @@ def curled(hair: Hair, op: Curl, ground: Ground, chance: Chance) -> Hair:
         pitch=np.maximum(pitch, _SHORTEST_PITCH),
         phase=phase + op.phase_jitter * chance.normal(index, _OWN_PHASE),
         flatness=op.flatness * hand,
-        onset=ground.values(op.onset, hair),
+        onset=hair.free_from + ground.values(op.onset, hair),
         ramp=np.full(len(hair), op.ramp),
     )
     return replace(hair, points=coiled(hair.points, hair.length, hair.comb, coil))

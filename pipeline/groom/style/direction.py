@@ -8,7 +8,7 @@ from pipeline.config.schema import Direction
 from pipeline.groom.style.chance import Chance
 from pipeline.groom.style.ground import Ground, tangential
 from pipeline.groom.style.growth import Sprouts, grown, stretches, swept
-from pipeline.groom.style.hair import STEP, Hair, Vectors, unit
+from pipeline.groom.style.hair import STEP, Hair, Vectors, cut_to, unit
 
 _TILT, _BEND, _COMB, _JITTER, _WANDER = 0, 1, 2, 10, 20  # uses of chance
 
@@ -32,9 +32,12 @@ def directed(hair: Hair, op: Direction, ground: Ground, chance: Chance) -> Hair:
         layer=ground.values(op.lift, hair) * (0.25 + 0.75 * chance.layer(index)),
         bend=op.bend * (0.8 + 0.4 * chance.uniform(index, _BEND)),
         comb=op.comb * (0.85 + 0.3 * chance.uniform(index, _COMB)),
+        length=hair.length,
         wander=np.stack(wander, axis=1),
     )
-    points = _at(grown(own, terrain, op.lift_over, steps), hair.along / STEP)
+    points = grown(own, terrain, op.lift_over, steps)
+    if hair.points.shape[1] > 2:
+        points = cut_to(points, hair.length, hair.points.shape[1])
     return replace(hair, points=points, comb=comb)
 
 
@@ -44,11 +47,3 @@ def _first_direction(hair: Hair, op: Direction, ground: Ground, chance: Chance, 
     tilt = np.clip(ground.values(op.tilt, hair) + op.tilt_jitter * spread, 0, 1.5)[:, None]
     aside = unit(comb + op.direction_jitter * chance.directions(index, _JITTER))
     return unit(np.cos(tilt) * hair.normal + np.sin(tilt) * aside)
-
-
-def _at(points: Vectors, step: Vectors) -> Vectors:
-    """Points (N, K, 3) of polylines at fractional numbers of steps (N, K)."""
-    i = np.minimum(step.astype(np.int64), points.shape[1] - 2)
-    u = (step - i)[..., None]
-    row = np.arange(len(points))[:, None]
-    return np.asarray(points[row, i] * (1 - u) + points[row, i + 1] * u)

@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline import kernels
 from pipeline.config.schema import Varied
 from pipeline.errors import InputError
 from pipeline.groom.combing import Combing
 from pipeline.groom.head_field import Field
 from pipeline.groom.heads import Head
 from pipeline.groom.style.fields import Scalp, varied
-from pipeline.groom.style.hair import Hair, Middles, Vectors
+from pipeline.groom.style.hair import STEP, Hair, Middles, Vectors
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,12 @@ class Terrain:
     skin: Field
     wall: Field
     combing: Combing
+
+    @cached_property
+    def native(self) -> kernels.Terrain:
+        """The wall and the combing, to grow over in steps of `STEP`."""
+        chart = self.combing.chart
+        return kernels.Terrain(self.wall.native, chart.center, chart.axes, self.combing.grid, STEP)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.groom.head.distance import smoothstep
+from pipeline import kernels
 from pipeline.groom.style.hair import Vectors, dot, unit
 
 
@@ -32,30 +32,11 @@ class Coil:
 
 def coiled(points: Vectors, length: Vectors, reference: Vectors, coil: Coil) -> Vectors:
     """Points (N, K, 3) [m] wound about strands of `length` (N,) whose frames start from `reference` (N, 3)."""
-    u, v = frames(points, reference)
-    along = np.linspace(0, 1, points.shape[1]) * length[:, None]
-    theta = coil.phase[:, None] + 2 * np.pi * along / coil.pitch[:, None]
-    radius = coil.radius[:, None] * smoothstep((along - coil.onset[:, None]) / coil.ramp[:, None])
-    second = radius * coil.flatness[:, None] * np.sin(theta)
-    return np.asarray(points + (radius * np.cos(theta))[..., None] * u + second[..., None] * v)
-
-
-def frames(points: Vectors, reference: Vectors) -> tuple[Vectors, Vectors]:
-    """Rotation-minimising unit normals U and V, each (N, K, 3), started from the reference direction (N, 3)."""
-    t = unit(np.gradient(points, axis=1))
-    u = np.empty_like(points)
-    u[:, 0] = across(reference, t[:, 0])
-    for j in range(points.shape[1] - 1):
-        chord = points[:, j + 1] - points[:, j]
-        u_mirrored, t_mirrored = _mirror(u[:, j], chord), _mirror(t[:, j], chord)
-        u[:, j + 1] = _mirror(u_mirrored, t[:, j + 1] - t_mirrored)
-    return u, np.cross(t, u)
+    c = coil
+    rows = np.stack([c.radius, c.pitch, c.phase / (2 * np.pi), c.flatness, c.onset, c.ramp], axis=1)
+    return kernels.coiled(points, reference, length, rows)
 
 
 def across(reference: Vectors, t: Vectors) -> Vectors:
     """The unit part (N, 3) of reference directions across unit directions t (N, 3)."""
     return unit(reference - dot(reference, t) * t)
-
-
-def _mirror(v: Vectors, normal: Vectors) -> Vectors:
-    return np.asarray(v - 2 * dot(normal, v) / np.maximum(dot(normal, normal), 1e-20) * normal)

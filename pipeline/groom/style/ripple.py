@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.groom.head.distance import smoothstep
+from pipeline import kernels
 from pipeline.groom.style.chance import Chance
 from pipeline.groom.style.hair import Vectors
 
@@ -17,12 +17,8 @@ def rippled(
 
     `period` [m] and `phase` [turns] are (N, Q), `swing` (N, Q, 3) [m].
     """
-    along = np.linspace(0, 1, points.shape[1]) * length[:, None]
-    noise = np.zeros_like(points)
-    for q in range(period.shape[1]):
-        wave = np.sin(2 * np.pi * (along / period[:, q, None] + phase[:, q, None]))
-        noise += swing[:, q, None] * wave[..., None]
-    return np.asarray(points + smoothstep(along / over)[..., None] * noise)
+    waves = np.concatenate([period[..., None], phase[..., None], swing], axis=2)
+    return kernels.shaken(points, length, waves, np.full(len(points), over))
 
 
 def sines(

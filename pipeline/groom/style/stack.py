@@ -7,24 +7,30 @@ from typing import Any
 import numpy as np
 
 from pipeline.config.schema import (
+    Bend,
     Clump,
     Curl,
     Direction,
     Flyaway,
+    Fringe,
     Frizz,
+    Gather,
     Lengths,
     Operator,
     Trim,
     Wave,
 )
+from pipeline.groom.style.bend import bent
 from pipeline.groom.style.chance import Chance
 from pipeline.groom.style.clump import clumped
 from pipeline.groom.style.curl import curled
 from pipeline.groom.style.direction import directed
 from pipeline.groom.style.flyaway import flown
+from pipeline.groom.style.fringe import fringed
 from pipeline.groom.style.frizz import frizzed
+from pipeline.groom.style.gather import gathered
 from pipeline.groom.style.ground import Ground
-from pipeline.groom.style.hair import Hair, Index, Middles
+from pipeline.groom.style.hair import Hair, Index, Middles, divided
 from pipeline.groom.style.lengths import lengthened
 from pipeline.groom.style.locks import Locks
 from pipeline.groom.style.trim import trimmed
@@ -42,7 +48,13 @@ OPERATORS: dict[type[Operator], Callable[[Hair, Any, Ground, Chance], Hair]] = {
     Wave: waved,
     Frizz: frizzed,
     Flyaway: flown,
+    Bend: bent,
+    Gather: gathered,
+    Fringe: fringed,
 }
+
+
+GROW_ANEW = (Direction, Lengths)  # operators that take no notice of points between root and tip
 
 
 class Stack:
@@ -80,13 +92,15 @@ class Stack:
         """Middles, carried in chunks through the first so many operators."""
         parts = np.array_split(index, -(-len(index) // CHUNK))
         hair = [self._through(part, steps) for part in parts]
-        points, length = ([getattr(part, name) for part in hair] for name in ("points", "length"))
-        return Middles(np.concatenate(points), np.concatenate(length))
+        names = ("points", "length", "free_from", "sections")
+        return Middles(*(np.concatenate([getattr(part, name) for part in hair]) for name in names))
 
     def _through(self, index: Index, steps: int) -> Hair:
         hair = self._start(index)
         locks = {name: found.of(index) for name, found in self._locks.items()}
         hair = replace(hair, locks=locks)
         for name, op in self._steps[:steps]:
+            if not isinstance(op, GROW_ANEW):
+                hair = divided(hair)
             hair = OPERATORS[type(op)](hair, op, self._ground, Chance(self._ground.seed, name))
-        return hair
+        return divided(hair)

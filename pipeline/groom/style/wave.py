@@ -33,7 +33,7 @@ def waved(hair: Hair, op: Wave, ground: Ground, chance: Chance) -> Hair:
         pitch=wavelength,
         phase=phase - 2 * np.pi * _at_the_ears(hair) / wavelength,
         flatness=np.zeros(len(hair)),
-        onset=ground.values(op.onset, hair),
+        onset=hair.free_from + ground.values(op.onset, hair),
         ramp=np.full(len(hair), op.ramp),
     )
     return replace(hair, points=coiled(hair.points, hair.length, _swing(hair, op.sideways), coil))
