@@ -12,10 +12,11 @@ from pipeline.body.distance import Grid
 Points = NDArray[np.floating[Any]]
 Vectors = NDArray[np.float64]
 
-# The wall is the skin joined with an ellipsoid in front of the face, so that hair falls beside it.
-_GUARD_CENTER = np.array([0.0, -0.035, 0.068])
-_GUARD_RADII = np.array([0.064, 0.112, 0.090])
-_GUARD_BLEND = 0.025
+# The wall is the skin joined with ellipsoids that shed hair: one in front of the face, so that it falls beside it, and
+# a fin on either shoulder, so that it falls before or behind it and does not lie there like a rug.
+_FACE = ((0.0, -0.035, 0.068), (0.064, 0.112, 0.090), 0.025)  # centre, radii, blend [m]
+_SHOULDERS = tuple(((side * 0.125, -0.200, -0.030), (0.070, 0.100, 0.024), 0.030) for side in (-1, 1))
+_ON_SHOULDER = (0.1, -0.2, -0.03)  # below the skin where there are shoulders
 
 
 @dataclass(frozen=True)
@@ -63,18 +64,25 @@ class Field:
         )
 
     def guarded(self) -> "Field":
-        """The wall: this field joined smoothly with the face guard (fitted coordinates)."""
+        """The wall: this field joined smoothly with the guards (fitted coordinates)."""
+        shoulders = self.distance(np.array([_ON_SHOULDER]))[0] < 0
+        values = self.values
+        for centre, radii, blend in (_FACE, *(_SHOULDERS if shoulders else ())):
+            guard = self._ellipsoid(np.array(centre), np.array(radii))
+            h = np.maximum(blend - np.abs(values - guard), 0) / blend
+            values = np.minimum(values, guard) - blend / 6 * h**3
+        return Field(np.ascontiguousarray(values, np.float32), self.origin, self.spacing)
+
+    def _ellipsoid(self, centre: Vectors, radii: Vectors) -> NDArray[np.float32]:
+        """About the distance [m] to an ellipsoid at the points of the grid."""
         axes = [o + self.spacing * np.arange(n) for o, n in zip(self.origin, self.values.shape, strict=True)]
         x, y, z = (
             ((a - c) / r).astype(np.float32).reshape([-1 if k == i else 1 for k in range(3)])
-            for i, (a, c, r) in enumerate(zip(axes, _GUARD_CENTER, _GUARD_RADII, strict=True))
+            for i, (a, c, r) in enumerate(zip(axes, centre, radii, strict=True))
         )
         k0 = np.sqrt(x**2 + y**2 + z**2) + 1e-6
-        k1 = np.sqrt((x / _GUARD_RADII[0]) ** 2 + (y / _GUARD_RADII[1]) ** 2 + (z / _GUARD_RADII[2]) ** 2)
-        guard = k0 * (k0 - 1) / (k1 + 1e-6)
-        h = np.maximum(_GUARD_BLEND - np.abs(self.values - guard), 0) / _GUARD_BLEND
-        joined = np.minimum(self.values, guard) - _GUARD_BLEND / 6 * h**3
-        return Field(np.ascontiguousarray(joined, np.float32), self.origin, self.spacing)
+        k1 = np.sqrt((x / radii[0]) ** 2 + (y / radii[1]) ** 2 + (z / radii[2]) ** 2)
+        return np.asarray(k0 * (k0 - 1) / (k1 + 1e-6), np.float32)
 
 
 def distance_grid(points: Points, triangles: NDArray[np.integer], spacing: float) -> Field:

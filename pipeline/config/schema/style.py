@@ -51,7 +51,7 @@ class Lengths(Operator):
     op: Literal["length"]
     """Strands are cut to a length."""
     length: VaryingLength = 0.25
-    """Arc length from the root; what is shorter stays as it is, and nothing is longer than 42 cm."""
+    """Arc length from the root; what is shorter stays as it is, and nothing is longer than 56 cm."""
     jitter: Fraction = 0.0
     """Random shortening of single strands, as a fraction of the length."""
 

@@ -14,7 +14,7 @@ from pipeline.strands.partings import NOBODY
 Vectors = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-LONGEST = 0.42  # [m]
+LONGEST = 0.56  # [m]
 STEP = 4e-3  # [m] between the points of hair that is not cut yet
 UNCUT = round(LONGEST / STEP) + 1  # points
 
