@@ -366,7 +366,14 @@ class HairGrid(Neighbours):
     """
 
     def __init__(
-        self, rest: RestShape, cell: float, density: float, pressure: float, drag: float, limit: float
+        self,
+        rest: RestShape,
+        cell: float,
+        density: float,
+        pressure: float,
+        drag: float,
+        limit: float,
+        hold: int = 1,
     ) -> None:
         """The densities of the rest shape, on the grid.
 
@@ -377,6 +384,7 @@ class HairGrid(Neighbours):
             pressure: [m^2/s^2] k_p of a = -k_p grad(density / allowed).
             drag: [1/s] the rate at which velocities blend.
             limit: [m/s^2] largest push along each axis.
+            hold: steps from one look at the grid to the next; the force stays with its point in between.
 
         Raises:
             ValueError: a value outside its range, or cells too small for the reach of the strands.
@@ -394,8 +402,9 @@ def advance(
     """Advances the state in place by the steps of the drive.
 
     Without neighbours a strand's motion depends neither on the number of threads nor on the strands beside it. With
-    hair-hair contact all strands go step by step together; the result depends neither on the number of threads nor on
-    how the steps are split into calls. Never raises for bad physics: see `Report.bad_strand`.
+    hair-hair contact all strands go together from one look at their neighbours to the next, of which the first step of
+    a call has one; the result depends neither on the number of threads nor on how the steps are split into calls, if
+    each begins where one looks. Never raises for bad physics: see `Report.bad_strand`.
 
     Raises:
         ValueError: shapes that do not fit, or settings outside their range.

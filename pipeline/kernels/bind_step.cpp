@@ -105,8 +105,9 @@ template <class Real>
 static Report advance_as(const State &state, const RestShape &rest, const DistanceField *field, const Drive &drive,
                          const StepSettings &settings, const Neighbours *neighbours) {
     if (!neighbours) return advance(state.arrays<Real>(), rest, field, drive, settings, threads());
-    Together<Real> strands(state.arrays<Real>(), rest, drive, settings);
-    return strands.advance(field, *neighbours->start(Real(), settings.theta * settings.dt), threads());
+    Together<Real> strands(state.arrays<Real>(), rest, drive, settings, neighbours->hold());
+    const auto force = neighbours->start(Real(), settings.theta * settings.dt);
+    return strands.advance(field, *force, threads());
 }
 
 static Report advance_state(State &state, const RestShape &rest, const DistanceField *field, const Drive &drive,

@@ -87,7 +87,7 @@ template <class Real> class CapsuleForce final : public NeighbourForce<Real> {
           grid_(capsules.allowed, capsules.rods(), capsules.P - 1, capsules.cell(),
                 capsules.law(theta_dt)) {}
 
-    void see(const Resident<Real> &resident, int, const Pose &head) override {
+    void see(const Resident<Real> &resident, int, const Pose &head, double) override {
         const Rigid<Real> local(head.inverse());
         const Vec3<Real> lowest = broadcast<Real>(capsules_.lowest), highest = broadcast<Real>(capsules_.highest);
         float ends[2][kLanes<Real>][6]; // by lane: where a point will be, and its velocity
@@ -107,9 +107,9 @@ template <class Real> class CapsuleForce final : public NeighbourForce<Real> {
         }
     }
 
-    void look(const std::vector<Resident<Real>> &, const Pose &) override { grid_.work(); }
+    void look(const Pose &) override { grid_.work(); }
 
-    void act(Resident<Real> &resident, int) override {
+    void act(const Resident<Real> &resident, int, Outside<Real> &outside) override {
         for (int i = 0; i < capsules_.P; ++i) {
             L sums[9] = {};
             for (int lane = 0; lane < kLanes<Real>; ++lane) {
@@ -120,11 +120,8 @@ template <class Real> class CapsuleForce final : public NeighbourForce<Real> {
                 for (int k = 0; after && k < 9; ++k) sums[k][lane] += Real(after->at[0][k]);
             }
             const L per_mass = resident.block.per_mass / resident.block.mu[i];
-            const Vec3<Real> v = resident.now.v[i];
-            for (int k = 0; k < 6; ++k) resident.outside.rate[6 * i + k] = per_mass * sums[3 + k];
-            resident.outside.push[i] = Vec3<Real>{};
-            resident.outside.push[i] = per_mass * Vec3<Real>{sums[0], sums[1], sums[2]} -
-                                       acceleration(resident.outside, i, v); // push = f / m + C v
+            for (int k = 0; k < 6; ++k) outside.rate[6 * i + k] = per_mass * sums[3 + k];
+            outside.force[i] = per_mass * Vec3<Real>{sums[0], sums[1], sums[2]};
         }
     }
 

@@ -1,8 +1,8 @@
-// All strands step by step together, each step at the same time: strands that push one another.
+// All strands together, from one look of the neighbours to the next: strands that push one another.
 //
-// Blocks stay in lanes for the whole call, so that a step reads and writes no arrays of the caller. At the start of a
-// step the neighbours look at all strands; then every block gets their force and steps by itself. Nothing is kept from
-// one step to the next but the state: calls may be split anywhere.
+// Blocks stay in lanes for the whole call, so that a step reads and writes no arrays of the caller. The neighbours look
+// at all strands; then every block gets their force and goes to the next look by itself. Nothing is kept from one look
+// to the next but the state: calls may be split wherever one looks.
 #pragma once
 
 #include "advance.hpp"
@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 namespace ringlet {
 
@@ -33,28 +34,30 @@ inline constexpr int kBlocksForThread = 4;
 /// The blocks of a state in lanes; every block's memory is its own.
 template <class Real> class Together {
   public:
-    Together(StateArrays<Real> state, const RestShape &rest, const Drive &drive, const StepSettings &settings)
-        : state_(state), rest_(rest), drive_(drive), settings_(settings), tallies_(block_count<Real>(rest.S)),
-          arena_(tallies_.size() * Resident<Real>::bytes(rest.P)) {
-        for (int b = 0; b < int(tallies_.size()); ++b)
-            blocks_.emplace_back(arena_, rest.P, BlockIndex<Real>(b, rest.S));
-    }
+    Together(StateArrays<Real> state, const RestShape &rest, const Drive &drive, const StepSettings &settings,
+             int hold)
+        : state_(state), rest_(rest), drive_(drive), settings_(settings), hold_(hold), tallies_(block_count<Real>(rest.S)),
+          blocks_(tallies_.size()) {}
 
     Report advance(const DistanceField *field, NeighbourForce<Real> &force, int most_threads) {
-        const int threads = std::clamp(int(blocks_.size()) / kBlocksForThread, 1, most_threads);
+        const int blocks = int(blocks_.size()), threads = std::clamp(blocks / kBlocksForThread, 1, most_threads);
+        const int share = (blocks + threads - 1) / threads; // blocks that a thread has memory for
         double looking = 0, acting = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : acting)
         {
-            Arena arena(Stepper<Real>::bytes(rest_.P));
+            Arena arena(Stepper<Real>::bytes(rest_.P) + share * Resident<Real>::bytes(rest_.P));
             Stepper<Real> stepper(arena, rest_.P, settings_, field);
-            read_blocks(stepper, force);
+            Outside<Real> outside(arena, rest_.P);
+            stepper.outside = &outside;
+#pragma omp for schedule(static, share)
+            for (int b = 0; b < blocks; ++b) read_block(arena, stepper, force, b);
             double look = 0;
-            for (int k = 0; k < drive_.steps; ++k) {
+            for (int first = 0; first < drive_.steps; first += hold_) {
                 {
                     const Clock clock(look);
-                    force.look(blocks_, drive_.head[k]);
+                    force.look(pose_seen(first));
                 }
-                step_blocks(stepper, force, k, acting);
+                step_blocks(stepper, outside, force, first, acting);
             }
             write_blocks();
 #pragma omp single
@@ -71,46 +74,65 @@ template <class Real> class Together {
     const RestShape &rest_;
     const Drive &drive_;
     const StepSettings &settings_;
+    const int hold_;
     std::vector<Tally<Real>> tallies_;
-    Arena arena_;
-    std::vector<Resident<Real>> blocks_;
+    std::vector<std::optional<Resident<Real>>> blocks_;
 
-    void read_blocks(Stepper<Real> &stepper, NeighbourForce<Real> &force) {
-#pragma omp for schedule(static)
-        for (int b = 0; b < int(blocks_.size()); ++b) {
-            Resident<Real> &resident = blocks_[b];
-            read(resident.block, rest_, resident.index, settings_.torsion != Torsion::kirchhoff);
-            read(resident.now, state_, rest_.P, resident.index);
-            stepper.exchange(resident);
-            stepper.contacts.forget(rest_.P);
-            stepper.exchange(resident);
-            force.see(resident, b, drive_.head[0]);
-        }
+    /// The first step that a look at the start of a step no longer serves for.
+    int next_look(int first) const { return std::min(first + hold_, drive_.steps); }
+
+    /// The head's pose in the middle between the first and the last step that a look serves for.
+    Pose pose_seen(int first) const {
+        const int sum = first + std::max(first, next_look(first) - 1);
+        const Pose &pose = drive_.head[sum / 2];
+        return sum % 2 ? halfway(pose, drive_.head[sum / 2 + 1]) : pose;
     }
 
-    void step_blocks(Stepper<Real> &stepper, NeighbourForce<Real> &force, int k, double &acting) {
+    void see(NeighbourForce<Real> &force, const Resident<Real> &resident, int b, int first) const {
+        const double ahead = 0.5 * settings_.dt * std::max(0, next_look(first) - 1 - first);
+        force.see(resident, b, pose_seen(first), ahead);
+    }
+
+    void read_block(Arena &arena, Stepper<Real> &stepper, NeighbourForce<Real> &force, int b) {
+        Resident<Real> &resident = blocks_[b].emplace(arena, rest_.P, BlockIndex<Real>(b, rest_.S));
+        read(resident.block, rest_, resident.index, settings_.torsion != Torsion::kirchhoff);
+        read(resident.now, state_, rest_.P, resident.index);
+        stepper.exchange(resident);
+        stepper.contacts.forget(rest_.P);
+        stepper.exchange(resident);
+        see(force, resident, b, 0);
+    }
+
+    /// Acts on every block and takes it to the next look.
+    void step_blocks(Stepper<Real> &stepper, Outside<Real> &outside, NeighbourForce<Real> &force, int first,
+                     double &acting) {
+        const int last = next_look(first);
         RootPose<Real> roots[2];
 #pragma omp for schedule(dynamic, 1)
         for (int b = 0; b < int(blocks_.size()); ++b) {
-            Resident<Real> &resident = blocks_[b];
+            Resident<Real> &resident = *blocks_[b];
             {
                 const Clock clock(acting);
-                force.act(resident, b);
+                force.act(resident, b, outside);
             }
-            stepper.outside = &resident.outside;
             stepper.tally = tallies_[b];
             stepper.exchange(resident);
-            stepper.step(interval_of(drive_, k, settings_, rest_.S, resident.index, roots), own_lanes(resident.index));
+            for (int k = first; k < last; ++k) {
+                outside.begin_step(stepper.now.v, rest_.P);
+                stepper.step(interval_of(drive_, k, settings_, rest_.S, resident.index, roots),
+                             own_lanes(resident.index));
+            }
             stepper.exchange(resident);
             tallies_[b] = stepper.tally;
+            if (last == drive_.steps) continue; // nobody looks
             const Clock clock(acting);
-            force.see(resident, b, drive_.head[k + 1]);
+            see(force, resident, b, last);
         }
     }
 
     void write_blocks() {
 #pragma omp for schedule(static)
-        for (int b = 0; b < int(blocks_.size()); ++b) write(blocks_[b].now, state_, rest_.P, blocks_[b].index);
+        for (int b = 0; b < int(blocks_.size()); ++b) write(blocks_[b]->now, state_, rest_.P, blocks_[b]->index);
     }
 };
 
@@ -125,18 +147,17 @@ void neighbour_acceleration(StateArrays<Real> state, const RestShape &rest, Neig
         residents.emplace_back(arena, rest.P, BlockIndex<Real>(b, rest.S));
         read(residents[b].block, rest, residents[b].index);
         read(residents[b].now, state, rest.P, residents[b].index);
-        force.see(residents[b], b, head);
+        force.see(residents[b], b, head, 0);
     }
 #pragma omp parallel num_threads(threads)
     {
-        force.look(residents, head);
+        Arena own(Stepper<Real>::bytes(rest.P));
+        Outside<Real> outside(own, rest.P);
+        force.look(head);
 #pragma omp for
         for (int b = 0; b < blocks; ++b) {
-            Resident<Real> &resident = residents[b];
-            force.act(resident, b);
-            for (int i = 0; i < rest.P; ++i)
-                resident.outside.push[i] = acceleration(resident.outside, i, resident.now.v[i]);
-            scatter(resident.outside.push, a, rest.P, resident.index);
+            force.act(residents[b], b, outside);
+            scatter(outside.force, a, rest.P, residents[b].index);
         }
     }
 }

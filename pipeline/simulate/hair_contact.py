@@ -1,18 +1,33 @@
 """Hair-hair contact: from the config to the method that the kernels step with, and what it costs."""
 
+import math
 from dataclasses import dataclass
 
 from pipeline import kernels
 from pipeline.config.schema import HairContact
 from pipeline.errors import InputError
 
+_HELD = 0.25
+"""Cells that pressure may cross, and part of a velocity that may be blended, between two looks at the grid."""
+
+
+def steps_held(contact: HairContact, dt: float) -> int:
+    """Steps of dt [s] that a look at the grid serves for.
+
+    Pressure spreads at a speed of about sqrt(`pressure`), as sound does in a gas.
+    """
+    speed = math.sqrt(contact.pressure)
+    rate = max(speed / contact.cell, contact.drag, 1e-9)
+    return max(1, int(_HELD / rate / dt + 1e-9))
+
 
 def neighbours(
-    contact: HairContact, rest: kernels.RestShape, strands_per_guide: float
+    contact: HairContact, rest: kernels.RestShape, strands_per_guide: float, dt: float
 ) -> kernels.Neighbours | None:
     """The method that the config names, for guides that stand for so many strands each; None for "none".
 
     `density` is that of all strands, so that the number of guides does not matter; the kernels know the guides' mass.
+    `dt` [s] is the time step.
 
     Raises InputError when the cells of the grid are too small for the reach of the guides.
     """
@@ -20,7 +35,13 @@ def neighbours(
         density = contact.density / strands_per_guide
         try:
             return kernels.HairGrid(
-                rest, contact.cell, density, contact.pressure, contact.drag, contact.limit
+                rest,
+                contact.cell,
+                density,
+                contact.pressure,
+                contact.drag,
+                contact.limit,
+                steps_held(contact, dt),
             )
         except ValueError as error:
             raise InputError(

@@ -80,7 +80,7 @@ class Simulation:
             self.head = self.skin.moved(self.head)
         self.hand = hand_motion(simulate, _middle_of_held(guides))
         each = max(guides.strands, len(guides.points)) / len(guides.points)
-        self.neighbours = neighbours(simulate.hair_contact, self.rest, each)
+        self.neighbours = neighbours(simulate.hair_contact, self.rest, each, self.settings.dt)
         self.cost = Cost()
         self.wind = wind(simulate.air, seed)
         self.step = 0

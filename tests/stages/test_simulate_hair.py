@@ -10,7 +10,7 @@ from pipeline.bench.simulate import curly_head, round_head
 from pipeline.config.schema import HairContact, Motion, Simulate
 from pipeline.errors import InputError
 from pipeline.simulate import stage
-from pipeline.simulate.hair_contact import neighbours
+from pipeline.simulate.hair_contact import neighbours, steps_held
 from pipeline.simulate.rest import rest_shape
 from pipeline.simulate.stepper import Simulation
 
@@ -67,13 +67,24 @@ def test_the_density_is_that_of_all_strands() -> None:
         rest = rest_shape(simulate.hair, guides.points, guides.held, guides.offset)
         state = kernels.at_rest(guides.points.astype(np.float64))
         state.points[..., [0, 2]] *= 0.8
-        method = neighbours(simulate.hair_contact, rest, 60_000 / count)
+        method = neighbours(simulate.hair_contact, rest, 60_000 / count, 1 / 240)
         assert method is not None
         a = kernels.neighbour_acceleration(state, rest, method, np.eye(4), kernels.StepSettings())
         pushes.append(float(np.sqrt((a**2).sum(-1).mean())))
     print("root mean square push with 400 and 800 guides:", pushes)
     assert pushes[0] > 1
     assert pushes[1] == pytest.approx(pushes[0], rel=0.25)
+
+
+def test_the_grid_is_looked_at_before_pressure_crosses_a_cell() -> None:
+    contact = HairContact(cell=8e-3, pressure=0.05, drag=3.0)
+    held = {dt: steps_held(contact, dt) for dt in (1 / 30, 1 / 240, 1 / 2400)}
+    print("steps held:", held)
+    assert held[1 / 30] == 1
+    for dt in (1 / 240, 1 / 2400):
+        assert 0.05**0.5 * held[dt] * dt <= 8e-3 / 4 < 0.05**0.5 * (held[dt] + 1) * dt
+    assert steps_held(HairContact(cell=8e-3, pressure=0.2), 1 / 2400) == held[1 / 2400] // 2
+    assert steps_held(HairContact(pressure=0.0, drag=60.0), 1 / 240) == 1
 
 
 def test_cells_that_are_too_small_are_an_error_that_names_the_value() -> None:
