@@ -7,7 +7,10 @@ strands stay as they are, so that an export that was cut off goes on. Every file
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pipeline import cache
 from pipeline.cache.atomic import remove_stale
@@ -25,6 +28,7 @@ from pipeline.strands.formats.vtk_lines import write_series, write_vtp
 Format = Literal["usd", "abc", "hair", "vtp"]
 
 _MOMENTS: dict[str, Callable[[Path, Lines, Chunks], None]] = {"hair": write_hair_moment, "vtp": write_vtp}
+_STILL_FPS = 24.0  # of one frame
 _HEAD = 256  # bytes within which a file says what it was made from
 
 
@@ -54,6 +58,25 @@ def export(
         if kind in _MOMENTS:
             return _write_each(source, kind, frames, folder / what)
         return _write_all(source, kind, frames, folder / f"{what}.{'usdc' if kind == 'usd' else kind}")
+
+
+def write_still(path: Path, points: NDArray[np.float32], width: float) -> None:
+    """Write strands at rest (S, P, 3) [m] of one width [m] as a .usdc, .abc, .hair or .vtp file.
+
+    Raises InputError for another ending, a library that is missing or a full disk.
+    """
+    count, each, _ = points.shape
+    lines = Lines(count, each, np.full(each, width, np.float32), _STILL_FPS, "ringlet import")
+    source = Source(lines, lambda _: [points])
+    kind = {".usdc": "usd"}.get(path.suffix, path.suffix[1:])
+    if kind not in get_args(Format):
+        raise InputError(f"{path}: unknown kind of file; ringlet writes .usdc, .abc, .hair and .vtp")
+    _need_room(path.parent, lines, 1)
+    if kind not in _MOMENTS:
+        _write_all(source, kind, range(1, 2), path)
+        return
+    with cache.replacing(path) as temporary:
+        _MOMENTS[kind](temporary, lines, source.moment(1))
 
 
 def _write_each(source: Source, kind: str, frames: range, folder: Path) -> Path:

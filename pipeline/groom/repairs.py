@@ -35,7 +35,7 @@ class Repairs:
         """One line for each kind of repair that was made."""
         told = {
             "not_finite": "dropped, with points that are not finite",
-            "no_length": "dropped, with almost no length",
+            "no_length": "dropped, with almost no length, or too few points",
             "too_long": f"dropped, longer than {LONGEST:g} m",
             "merged_points": "had repeated points, merged",
             "turned_round": "had root and tip swapped, turned round",
@@ -67,7 +67,8 @@ def cleaned(strands: Ragged, repairs: Repairs) -> tuple[Ragged, NDArray[np.int64
         getattr(repairs, name).extend(np.flatnonzero(which).tolist())
     left = kept[owner] & ~repeated
     counts = np.bincount(owner[left], minlength=count)[kept]
-    return Ragged(strands.points[left], counts, strands.pins[kept]), np.flatnonzero(kept)
+    widths = None if strands.widths is None else strands.widths[left]
+    return Ragged(strands.points[left], counts, strands.pins[kept], widths), np.flatnonzero(kept)
 
 
 def turned(root: NDArray[np.float64], tip: NDArray[np.float64]) -> NDArray[np.bool_]:
