@@ -30,12 +30,18 @@ def read_usd(path: Path) -> Ragged:
 
     To be called where the library may crash: see `apart`.
     """
-    from pxr import Tf, Usd, UsdGeom
+    from pxr import Tf
 
     try:
-        stage = Usd.Stage.Open(str(path))
+        return _read(path)
     except Tf.ErrorException as error:
         raise InputError(f"{path}: OpenUSD cannot read it: {_reason(error)}") from None
+
+
+def _read(path: Path) -> Ragged:
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(path))
     time = Usd.TimeCode(stage.GetStartTimeCode()) if stage.HasAuthoredTimeCodeRange() else None
     places = UsdGeom.XformCache(time or Usd.TimeCode.EarliestTime())
     pieces = [_read_prim(path, prim, places) for prim in _drawn(stage, places.GetTime())]
@@ -165,5 +171,8 @@ def _widths(curves: "UsdGeom.BasisCurves", time: "Usd.TimeCode") -> tuple[NDArra
 
 def _reason(error: Exception) -> str:
     """What the library says, without the places in its own code."""
-    said = [line.split(" : ", 1)[1] for line in str(error).splitlines() if " : " in line]
+    try:
+        said = [line.split(" : ", 1)[1] for line in str(error).splitlines() if " : " in line]
+    except UnicodeDecodeError:  # it quotes the file
+        return "it is no text"
     return said[0].strip("' ") if said else "not a stage"
