@@ -1,12 +1,14 @@
 """The expansion that an experiment's caches describe, for whoever draws or exports its strands."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.body.frames import BodyFrames
+from pipeline.body.roots import SkinRoots
 from pipeline.cache.store import Reader
 from pipeline.config import Config
-from pipeline.strands.expand import Binding, Expansion, Style
+from pipeline.strands.expand import Binding, Expansion, MovedSkin, Style
 
 
 def expansion_from(groom: Reader, strands: Reader, config: Config) -> Expansion:
@@ -47,3 +49,17 @@ def body_frames(groom: Reader) -> BodyFrames | None:
         poses=groom["body/pose"][:],
         spacing=float(groom["head/spacing"][0]),
     )
+
+
+class MovingSkin:
+    """A head in motion under the roots (N, 3) [m] of all strands."""
+
+    def __init__(self, body: BodyFrames, roots: NDArray[np.float32]) -> None:
+        self.body = body
+        self._roots = SkinRoots(body.rest, body.triangles, roots, body.spacing)
+
+    def at(self, index: int) -> MovedSkin:
+        """The skin of a frame, counted from 0, and where it has carried the roots."""
+        return MovedSkin(
+            self._roots.places(self.body.skin(index)), self.body.grid.field(self.body.distance(index))
+        )

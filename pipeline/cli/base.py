@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Group, Parameter
 
+from pipeline.errors import InputError
+
 if TYPE_CHECKING:
     from pipeline.cache import Experiment
     from pipeline.config import Loaded
 
 STAGES_GROUP = Group("Run", sort_key=0)
 LOOK_GROUP = Group("Look", sort_key=1)
-CHECK_GROUP = Group("Check and measure", sort_key=2)
+EXCHANGE_GROUP = Group("Exchange", sort_key=2)
+CHECK_GROUP = Group("Check and measure", sort_key=3)
 
 app = App(
     name="ringlet",
@@ -41,6 +44,10 @@ Json = Annotated[
 ]
 ConfigFile = Annotated[Path, Parameter(help="A config, such as configs/default.toml.")]
 
+FrameRange = Annotated[
+    str, Parameter(show_default=False, help='Only these frames, counted from 1: "10-20", or one, "7".')
+]
+
 OUTPUTS = Path("outputs")
 
 
@@ -56,6 +63,20 @@ def experiment_of(loaded: "Loaded", outputs: Path) -> "Experiment":
     from pipeline.cache import Experiment
 
     return Experiment(outputs / loaded.config.name)
+
+
+def frame_range(text: str, count: int) -> range | None:
+    """Frames of `--frames`, counted from 1; None for all. Raises InputError."""
+    if not text:
+        return None
+    first, dash, last = text.partition("-")
+    try:
+        wanted = range(int(first), int(last if dash else first) + 1)
+    except ValueError:
+        raise InputError(f'--frames {text}: expected a range such as "10-20" or a number') from None
+    if not wanted or wanted[0] < 1 or wanted[-1] > count:
+        raise InputError(f"--frames {text}: expected a range within 1-{count}")
+    return wanted
 
 
 def print_json(value: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from cyclopts import CycloptsError
 
-from pipeline.cli import check_commands, look_commands, run_commands  # noqa: F401, they add their commands
+from pipeline.cli import check_commands, exchange_commands, look_commands, run_commands  # noqa: F401, they add their commands
 from pipeline.cli.base import app
 from pipeline.errors import InputError
 

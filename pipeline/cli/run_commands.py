@@ -9,10 +9,12 @@ from pipeline.cli.base import (
     OUTPUTS,
     STAGES_GROUP,
     ConfigFile,
+    FrameRange,
     Outputs,
     Settings,
     app,
     experiment_of,
+    frame_range,
     load_config,
 )
 from pipeline.errors import InputError
@@ -21,9 +23,6 @@ if TYPE_CHECKING:
     from pipeline.cache import Experiment
     from pipeline.config import Loaded
 
-FrameRange = Annotated[
-    str, Parameter(show_default=False, help='Only these frames, counted from 1: "10-20", or one, "7".')
-]
 Stage = Annotated[str, Parameter(help="The last stage to run: groom, simulate, interpolate or render.")]
 
 
@@ -114,25 +113,12 @@ def _make(
     if stage not in STAGES:
         raise InputError(f"--until {stage}: expected one of {', '.join(STAGES)}")
     loaded = load_config(config, settings)
-    wanted = _frame_range(frames, loaded.config.simulate.frames)
+    wanted = frame_range(frames, loaded.config.simulate.frames)
     batch = Batch(loaded.config, experiment_of(loaded, outputs))
     before = STAGES[: STAGES.index(stage)] if everything else NEEDS[stage]
     for name in before:
         batch.make(name, touch=everything)
     batch.make(stage, wanted if stage == "render" else None)
-
-
-def _frame_range(text: str, count: int) -> range | None:
-    if not text:
-        return None
-    first, dash, last = text.partition("-")
-    try:
-        wanted = range(int(first), int(last if dash else first) + 1)
-    except ValueError:
-        raise InputError(f'--frames {text}: expected a range such as "10-20" or a number') from None
-    if not wanted or wanted[0] < 1 or wanted[-1] > count:
-        raise InputError(f"--frames {text}: expected a range within 1-{count}")
-    return wanted
 
 
 def _rendered(loaded: "Loaded", experiment: "Experiment") -> list[Path]:

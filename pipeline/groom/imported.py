@@ -54,7 +54,7 @@ def load(config: Config, head: Head | None) -> tuple[Strands, dict[str, Any]]:
     wide = width(metric)
     report = {"source": path.name, "file_strands": len(file), "repairs": vars(repairs), "width": wide}
     if wide is not None:
-        say("groom", f"{path.name}: its strands are {1e6 * wide:.3g} um wide; what is drawn is render.width")
+        say("groom", f"{path.name}: its strands are {1e3 * wide:.3g} mm wide; what is drawn is render.width")
     held = held_ends(pins, groom.points)
     if groom.pins is not None:
         held = read_held(Path(groom.pins), len(file), groom.points)[index]

@@ -35,7 +35,7 @@ class Repairs:
         """One line for each kind of repair that was made."""
         told = {
             "not_finite": "dropped, with points that are not finite",
-            "no_length": "dropped, with almost no length",
+            "no_length": "dropped, with almost no length, or too few points",
             "too_long": f"dropped, longer than {LONGEST:g} m",
             "merged_points": "had repeated points, merged",
             "turned_round": "had root and tip swapped, turned round",
@@ -53,21 +53,45 @@ def cleaned(strands: Ragged, repairs: Repairs) -> tuple[Ragged, NDArray[np.int64
     """The strands [m] that have a shape, without repeated points, and which strands of the file they are (S,)."""
     count = len(strands)
     owner = np.repeat(np.arange(count), strands.counts)
-    bad = np.bincount(owner, ~np.isfinite(strands.points).all(axis=1), count) > 0
+    bad = np.zeros(count, bool)
+    bad[owner[~_finite(strands.points)]] = True
     step = np.zeros(len(owner))
-    step[1:] = np.linalg.norm(np.diff(np.where(bad[owner, None], 0, strands.points), axis=0), axis=1)
-    step[strands.first[strands.counts > 0]] = 0
+    step[1:] = _lengths(
+        np.diff(strands.points if not bad.any() else _without(strands.points, bad[owner]), axis=0)
+    )
+    roots = strands.first[strands.counts > 0]
+    step[roots] = 0
     length = np.bincount(owner, step, count)
     short, long = ~bad & (length < SHORTEST), length > LONGEST
-    repeated = (step <= _REPEATED * length[owner]) & (np.arange(len(owner)) > strands.first[owner])
+    repeated = step <= _REPEATED * length[owner]
+    repeated[roots] = False
     kept = ~(bad | short | long)
+    if kept.all() and not repeated.any():
+        return strands, np.arange(count)
     merged = kept & (np.bincount(owner, repeated, count) > 0)
     found = {"not_finite": bad, "no_length": short, "too_long": long, "merged_points": merged}
     for name, which in found.items():
         getattr(repairs, name).extend(np.flatnonzero(which).tolist())
     left = kept[owner] & ~repeated
     counts = np.bincount(owner[left], minlength=count)[kept]
-    return Ragged(strands.points[left], counts, strands.pins[kept]), np.flatnonzero(kept)
+    widths = None if strands.widths is None else strands.widths[left]
+    return Ragged(strands.points[left], counts, strands.pins[kept], widths), np.flatnonzero(kept)
+
+
+def _finite(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which points (N, 3) are; column by column, since rows of three are slow to reduce."""
+    finite = np.isfinite(points)
+    return np.asarray(finite[:, 0] & finite[:, 1] & finite[:, 2])
+
+
+def _lengths(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    with np.errstate(over="ignore"):  # such strands are too long
+        return np.asarray(np.sqrt(np.einsum("ni,ni->n", x, x)))
+
+
+def _without(points: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Points (N, 3), with those of bad strands at the origin."""
+    return np.where(bad[:, None], 0, points)
 
 
 def turned(root: NDArray[np.float64], tip: NDArray[np.float64]) -> NDArray[np.bool_]:

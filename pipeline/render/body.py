@@ -1,4 +1,4 @@
-"""The head in motion as it is drawn: its skin of every frame, and where that has carried the roots of all strands."""
+"""The head in motion as it is drawn: its skin of every frame."""
 
 from dataclasses import replace
 
@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from pipeline.body.frames import BodyFrames
 from pipeline.body.normals import point_normals
-from pipeline.body.roots import SkinRoots
+from pipeline.cache.expansion import MovingSkin
 from pipeline.render.frame import Moment, Skin
-from pipeline.strands.expand import MovedSkin
 
 
 class DrawnBody:
@@ -17,12 +16,12 @@ class DrawnBody:
 
     def __init__(self, body: BodyFrames, skin: Skin, roots: NDArray[np.float32]) -> None:
         self.body, self.skin = body, skin
-        self._roots = SkinRoots(body.rest, body.triangles, roots, body.spacing)
+        self._moving = MovingSkin(body, roots)
 
     def at(self, index: int, moment: Moment) -> Moment:
         """The moment with the skin of a frame, counted from 0."""
         points = self.body.skin(index)
-        field = self.body.grid.field(self.body.distance(index))
+        moved = self._moving.at(index)
         normals = point_normals(points, self.body.triangles).astype(np.float32)
-        skin = replace(self.skin, points=points, normals=normals, field=field)
-        return replace(moment, skin=skin, moved=MovedSkin(self._roots.places(points), field))
+        skin = replace(self.skin, points=points, normals=normals, field=moved.field)
+        return replace(moment, skin=skin, moved=moved)

@@ -1,7 +1,8 @@
 """Alembic: the ICurves of an archive, at their first sample.
 
 A strand is a curve; strands are counted over the objects in the order of the archive. Widths are diameters. There is
-neither unit nor up axis; transforms of objects are applied. Source: the documentation of AbcGeom's ICurvesSchema.
+neither unit nor up axis; transforms of objects are applied. Written are metres with y up and linear curves, sampled
+evenly in time. Source: the documentation of AbcGeom's ICurvesSchema and OCurvesSchema.
 """
 
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import InputError
 from pipeline.strands.formats.curves import Curves, Kind, Wrap, polylines
+from pipeline.strands.formats.lines import Chunks, Lines
 from pipeline.strands.formats.ragged import Ragged, gathered
 
 _BASES: dict[str, Kind] = {
@@ -45,6 +47,57 @@ def read_alembic(path: Path) -> Ragged:
     if not pieces:
         raise InputError(f"{path}: no curves in it, so no strands")
     return gathered(pieces)
+
+
+class AlembicWriter:
+    """Writes moments as samples of one archive: topology and widths once, points each time.
+
+    Chunks of strands are objects /strands_000 and so on; a sample goes to the file at once.
+    """
+
+    def __init__(self, path: Path, lines: Lines, first: int) -> None:
+        """Begin a file whose first moment is frame `first`. Raises ModuleNotFoundError without Alembic."""
+        import imath  # noqa: F401, brings the types of the arrays
+        from alembic3d import Abc, AbcCoreAbstract
+
+        self._lines, self._next = lines, first
+        self._archive = Abc.CreateArchiveWithInfo(str(path), "ringlet", lines.about)
+        times = AbcCoreAbstract.TimeSampling(1 / lines.fps, (first - 1) / lines.fps)
+        self._times = self._archive.addTimeSampling(times)
+        self._objects: list[Any] = []
+
+    def append(self, frame: int, chunks: Chunks) -> None:
+        """Append a moment; frames follow one another without gaps, or ValueError is raised."""
+        import imath
+        from alembic3d import AbcGeom
+
+        if frame != self._next:
+            raise ValueError(f"frame {frame}: expected {self._next}")
+        self._next += 1
+        for number, points in enumerate(chunks):
+            flat = np.ascontiguousarray(points.reshape(-1, 3), np.float32)
+            positions = imath.V3fArrayFromBuffer(flat)
+            if number < len(self._objects):
+                self._objects[number].getSchema().set(AbcGeom.OCurvesSchemaSample(positions))
+                continue
+            made = AbcGeom.OCurves(self._archive.getTop(), f"strands_{number:03d}", self._times)
+            counts = np.full(len(points), self._lines.points, np.int32)
+            widths = np.tile(self._lines.widths, len(points)).astype(np.float32)
+            sample = AbcGeom.OCurvesSchemaSample(
+                positions,
+                imath.IntArrayFromBuffer(counts),
+                AbcGeom.CurveType.kLinear,
+                AbcGeom.CurvePeriodicity.kNonPeriodic,
+            )
+            scope = AbcGeom.GeometryScope.kVertexScope
+            sample.setWidths(AbcGeom.OFloatGeomParamSample(imath.FloatArrayFromBuffer(widths), scope))
+            made.getSchema().set(sample)
+            self._objects.append(made)
+
+    def close(self) -> None:
+        """Write what the library still holds."""
+        self._objects = []
+        del self._archive
 
 
 def _curves(parent: Any, matrix: NDArray[np.float64]) -> Iterator[tuple[Any, NDArray[np.float64]]]:

@@ -1,39 +1,28 @@
 """Which reader for which file."""
 
-import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import InputError
+from pipeline.strands.formats.alembic import read_alembic
 from pipeline.strands.formats.apart import read_apart
+from pipeline.strands.formats.extras import missing
 from pipeline.strands.formats.hair import read_hair
 from pipeline.strands.formats.ragged import Ragged
 from pipeline.strands.formats.tfx import read_tfx
 from pipeline.strands.formats.usc_data import read_data
+from pipeline.strands.formats.usd import read_usd
+from pipeline.strands.formats.vtk_lines import read_vtk
 
+Reader = Callable[[Path], Ragged]
 
-@dataclass(frozen=True)
-class Library:
-    """A reader that needs a library, which is only imported where the file is read."""
-
-    module: str
-    function: str
-    extra: str = ""
-    """The extra of ringlet that brings the library; none for what ringlet always has."""
-
-
-_USD = Library("usd", "read_usd", "usd")
-_VTK = Library("vtk_lines", "read_vtk")
-READERS: dict[str, Callable[[Path], Ragged]] = {".tfx": read_tfx, ".hair": read_hair, ".data": read_data}
-LIBRARIES = {
-    ".usd": _USD,
-    ".usda": _USD,
-    ".usdc": _USD,
-    ".usdz": _USD,
-    ".vtp": _VTK,
-    ".vtkhdf": _VTK,
-    ".abc": Library("alembic", "read_alembic", "alembic"),
+READERS: dict[str, Reader] = {".tfx": read_tfx, ".hair": read_hair, ".data": read_data}
+LIBRARIES: dict[
+    str, Reader
+] = {  # readers by other people's libraries, which are imported when it comes to that
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), read_usd),
+    **dict.fromkeys((".vtp", ".vtkhdf"), read_vtk),
+    ".abc": read_alembic,
 }
 FORMATS = (*READERS, *LIBRARIES)
 
@@ -53,14 +42,7 @@ def read_groom(path: Path) -> Ragged:
 
 def read_here(path: Path) -> Ragged:
     """Read a file of a library in this process, which the file may crash."""
-    library = LIBRARIES[path.suffix.lower()]
     try:
-        read = getattr(
-            importlib.import_module(f"pipeline.strands.formats.{library.module}"), library.function
-        )
-        found: Ragged = read(path)
+        return LIBRARIES[path.suffix.lower()](path)
     except ModuleNotFoundError as error:
-        raise InputError(
-            f'{path}: reading {path.suffix} files needs {error.name}: pip install "ringlet[{library.extra}]"'
-        ) from None
-    return found
+        raise missing(error, f"{path}: reading it") from None

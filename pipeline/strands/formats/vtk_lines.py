@@ -1,18 +1,37 @@
 """VTK's PolyData: the polylines of a .vtp or .vtkhdf file, one a strand; of a series, its first step.
 
-A point array named `width` (or `widths`) holds diameters. There is neither unit nor up axis.
+A point array named `width` (or `widths`) holds diameters. There is neither unit nor up axis. Written are .vtp files with
+raw appended data, the way that needs no library and no more memory than a chunk: an XML head with the byte offset of
+each array, "_", then for each array its u64 number of bytes and the bytes. Source: "VTK XML file formats" of the VTK
+documentation.
 """
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
+from pipeline.strands.formats.lines import Chunks, Lines
 from pipeline.strands.formats.ragged import Ragged, widened
 
 _WIDTHS = ("width", "widths")
+_TOGETHER = 1 << 16  # strands whose arrays are written at once
+_ARRAY = '<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="appended" offset="{}"/>'
+_HEAD = """<?xml version="1.0"?>
+<!-- {about} -->
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+<PolyData><Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="{strands}" NumberOfStrips="0" NumberOfPolys="0">
+<Points>{0}</Points>
+<PointData>{1}</PointData>
+<CellData>{2}</CellData>
+<Lines>{3}{4}</Lines>
+</Piece></PolyData>
+<AppendedData encoding="raw">
+_"""
+_TAIL = b"\n</AppendedData>\n</VTKFile>\n"
 
 
 def read_vtk(path: Path) -> Ragged:
@@ -33,6 +52,47 @@ def read_vtk(path: Path) -> Ragged:
     counts = np.diff(offsets)
     pins = np.tile(np.array([2, 0], np.uint8), (len(counts), 1))
     return Ragged(widened(points[ids]), counts, pins, _widths(path, mesh, ids, len(points)))
+
+
+def write_vtp(path: Path, lines: Lines, chunks: Chunks) -> None:
+    """Write one moment as a .vtp file, chunk by chunk: points, `width` of points, `strand` number of cells."""
+    S, P = lines.strands, lines.points
+    layout = [  # type, name, components, bytes
+        ("Float32", "Points", 3, 12 * S * P),
+        ("Float32", "width", 1, 4 * S * P),
+        ("Int32", "strand", 1, 4 * S),
+        ("Int64", "connectivity", 1, 8 * S * P),
+        ("Int64", "offsets", 1, 8 * S),
+    ]
+    places = np.cumsum([0, *(8 + size for *_, size in layout)])
+    arrays = [_ARRAY.format(*array[:3], place) for array, place in zip(layout, places, strict=False)]
+    starts = range(0, S, _TOGETHER)
+    with path.open("wb") as file:
+        file.write(_HEAD.format(*arrays, about=lines.about, points=S * P, strands=S).encode())
+        _append(file, layout[0][3], (chunk.astype("<f4") for chunk in chunks))
+        profile = np.tile(lines.widths.astype("<f4"), min(S, _TOGETHER))
+        _append(file, layout[1][3], (profile[: (S - a) * P] for a in starts))
+        for kind, scale, (*_, size) in (("<i4", 1, layout[2]), ("<i8", P, layout[3])):
+            _append(file, size, (_numbers(a * scale, min(a + _TOGETHER, S) * scale, kind) for a in starts))
+        _append(file, layout[4][3], (_numbers(a + 1, min(a + _TOGETHER, S) + 1, "<i8") * P for a in starts))
+        file.write(_TAIL)
+
+
+def write_series(path: Path, frames: Sequence[tuple[float, str]]) -> None:
+    """Write a .pvd file, which ParaView opens as an animation: times [s] and the names of their .vtp files."""
+    rows = "".join(f'<DataSet timestep="{time:.9g}" part="0" file="{file}"/>\n' for time, file in frames)
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
+    path.write_text(f"{head}{rows}</Collection>\n</VTKFile>\n", encoding="utf-8")
+
+
+def _append(file: IO[bytes], size: int, pieces: Iterable[NDArray[Any]]) -> None:
+    file.write(np.uint64(size).astype("<u8").tobytes())
+    for piece in pieces:
+        file.write(piece.tobytes())
+
+
+def _numbers(a: int, b: int, kind: str) -> NDArray[Any]:
+    return np.arange(a, b, dtype=kind)
 
 
 def _read(path: Path) -> Any:
