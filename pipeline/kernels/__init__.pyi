@@ -819,7 +819,7 @@ class Raster:
         """Draw what was added over the backdrop into a picture (H, W, 3), linear RGB.
 
         Returns how many tiles lack hair that was cut off too early. If there are any, `add` and `colour` all strands
-        once more and compose again: only those tiles are drawn, with nothing cut off.
+        once more and compose again: only the pixels that lack hair are drawn, with nothing cut off.
         """
 
 # --- groom: random numbers, equal spacing, growth, curls, clumps (random, smooth_curve, grow, coil, locks .hpp) -------

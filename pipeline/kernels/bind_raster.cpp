@@ -90,9 +90,7 @@ static int compose(Raster &raster, const HeldBackdrop &back, Picture picture) {
     require(raster.bins.waiting == raster.bins.batches.size(), "Raster.compose: the last chunk has no colours");
     require(picture.shape(0) == size_t(raster.view.H) && picture.shape(1) == size_t(raster.view.W), "Raster.compose: the picture has another size");
     nb::gil_scoped_release release;
-    const int wrong = raster.compose(back, picture.data(), threads());
-    if (wrong) raster.again(back, threads());
-    return wrong;
+    return raster.compose(back, picture.data(), threads());
 }
 
 void bind_raster(nb::module_ &m) {

@@ -34,7 +34,8 @@ struct Batch {
 
 /// Cut-off depths, and the segments in front of them.
 struct Bins {
-    std::vector<float> cut;  // (tiles,); negative: nothing is wanted here
+    std::vector<float> cut; // (tiles,); negative: nothing is wanted here
+    std::vector<TilePixels> wanted; // (tiles,) or empty: pixels that segments must touch
     std::vector<Batch> batches;
     size_t waiting = 0; // first batch without colours
 
@@ -52,7 +53,7 @@ struct Bins {
         batches.resize(first + count);
 #pragma omp parallel num_threads(threads)
         {
-            Sieve sieve{view, cut, around, ScreenStrand(P), std::vector<int>(P), std::vector<int>(P)};
+            Sieve sieve{view, cut, around, wanted, ScreenStrand(P), std::vector<int>(P), std::vector<int>(P)};
 #pragma omp for schedule(dynamic, 1)
             for (int b = 0; b < count; ++b) {
                 Batch &batch = batches[first + b];
@@ -112,6 +113,7 @@ struct Bins {
     struct Sieve {
         const View &view;
         const std::vector<float> &cut, &around;
+        const std::vector<TilePixels> &wanted;
         ScreenStrand at;
         std::vector<int> passed, number;
 
@@ -167,11 +169,13 @@ struct Bins {
             const float nearest = std::min(s.d[0], s.d[1]), spread = std::abs(dd) * 0.75f * kTile / std::sqrt(square);
             const uint32_t segment = name | uint32_t(batch.segments.size());
             bool kept = false;
-            visit_tiles(view, s, 0.55f + std::max(s.h[0], s.h[1]), [&](int column, int row) {
+            const float half = std::max(s.h[0], s.h[1]);
+            visit_tiles(view, s, kReach + half, [&](int column, int row) {
                 const int tile = row * view.across() + column;
                 const float mx = (column + 0.5f) * kTile - s.x[0], my = (row + 0.5f) * kTile - s.y[0];
                 const float u = std::min(std::max((mx * dx + my * dy) * inverse, 0.0f), 1.0f), d = s.d[0] + dd * u;
                 if (std::max(nearest, d - spread) > cut[tile]) return;
+                if (!wanted.empty() && !wanted[tile].touched(s, kReach + half, float(column * kTile), float(row * kTile))) return;
                 Entry entry{uint32_t(tile), 0, segment};
                 std::memcpy(&entry.depth, &d, sizeof d);
                 batch.entries.push_back(entry);

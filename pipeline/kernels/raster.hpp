@@ -2,7 +2,7 @@
 //
 // Passes over all strands, in chunks of any size: (1) some of them tell how deep hair is seen (layers.hpp); (2) segments
 // before that depth are sorted into tiles (bins.hpp), and only their points need colours; (3) tiles are composited front
-// to back (tiles.hpp). A tile that was cut off too early says so, and is drawn again with nothing cut off: the picture is
+// to back (tiles.hpp). Pixels that were cut off too early say so, and are drawn again with nothing cut off: the picture is
 // the one of all strands. Nothing depends on chunks or threads: counts are integers, and equal depths are in the order
 // of strands. Ours; coverage in the spirit of Carpenter, "The A-buffer, an Antialiased Hidden Surface Method" (1984).
 #pragma once
@@ -20,7 +20,7 @@ class Raster {
     float layers; // of hair behind which nothing is seen
     Layers counted;
     Bins bins;
-    std::vector<uint8_t> wrong; // tiles that were cut off too early
+    std::vector<uint8_t> wrong; // tiles that are not drawn yet, or have pixels that were cut off too early
 
     /// Cuts off behind `layers` of hair, and behind the backdrop.
     void cut_off(const Backdrop &back, int threads) {
@@ -29,10 +29,13 @@ class Raster {
         const std::vector<float> solid = deepest(back, threads);
         for (int tile = 0; tile < view.tiles(); ++tile) bins.cut[tile] = std::min(bins.cut[tile], solid[tile]);
         wrong.assign(view.tiles(), 1);
+        bins.wanted.clear();
     }
 
-    /// Draws the tiles that are wrong into a picture (H, W, 3), linear RGB; how many of them still are.
+    /// Draws the tiles that are wrong into a picture (H, W, 3), linear RGB; how many of them still are. For those,
+    /// strands are to be added once more.
     int compose(const Backdrop &back, float *picture, int threads) {
+        std::vector<TilePixels> lacking(view.tiles());
         std::vector<size_t> begin;
         const std::vector<uint64_t> entries = sorted_by_tile(begin, threads);
         int count = 0;
@@ -45,23 +48,27 @@ class Raster {
                 if (!wrong[k]) continue;
                 mine.assign(entries.begin() + ptrdiff_t(begin[k]), entries.begin() + ptrdiff_t(begin[k + 1]));
                 std::sort(mine.begin(), mine.end());
-                wrong[k] = tile->draw(view, bins, mine.data(), mine.size(), back, k);
+                lacking[k] = tile->draw(view, bins, mine.data(), mine.size(), back, k,
+                                        bins.wanted.empty() ? TilePixels::all() : bins.wanted[k]);
                 tile->write(view, back, k, picture);
+                wrong[k] = std::any_of(lacking[k].row, lacking[k].row + kTile, [](uint32_t row) { return row != 0; });
                 count += wrong[k];
             }
         }
         bins.batches.clear();
         bins.waiting = 0;
+        if (count) only(std::move(lacking), back, threads);
         return count;
     }
 
-    /// Prepares for the strands to be added once more, for the tiles that are wrong.
-    void again(const Backdrop &back, int threads) {
+  private:
+    /// From now on only these pixels are wanted, and nothing before the backdrop is cut off.
+    void only(std::vector<TilePixels> pixels, const Backdrop &back, int threads) {
         const std::vector<float> solid = deepest(back, threads);
         for (int tile = 0; tile < view.tiles(); ++tile) bins.cut[tile] = wrong[tile] ? solid[tile] : -1;
+        bins.wanted = std::move(pixels);
     }
 
-  private:
     std::vector<float> deepest(const Backdrop &back, int threads) const {
         std::vector<float> depth(view.tiles(), 0);
         const int side = kTile * back.n;

@@ -17,6 +17,8 @@ namespace ringlet {
 inline constexpr int kTile = 16;          // [px] side of a tile
 inline constexpr float kOutermost = 1e6f; // [px] a segment that reaches farther is not drawn: its direction is rounding
 
+inline constexpr float kReach = 0.3f;     // [px] beyond its half width that a segment covers cells of pixels
+
 /// The camera of a picture.
 struct View {
     float M[4][4];     // world [m] to clip space
@@ -97,6 +99,38 @@ inline bool drawable(const Segment &s) {
     }
     return most < kOutermost && std::isfinite(sum);
 }
+
+/// Pixels of a tile, a bit for each in each row.
+struct TilePixels {
+    uint32_t row[kTile];
+
+    static TilePixels all() {
+        TilePixels pixels;
+        std::fill(pixels.row, pixels.row + kTile, (1u << kTile) - 1);
+        return pixels;
+    }
+
+    /// Whether a segment of half width `reach` [px], with the tile's corner at (left, top), may touch any of them.
+    bool touched(const Segment &s, float reach, float left, float top) const {
+        const float x0 = s.x[0] - left, y0 = s.y[0] - top, dx = s.x[1] - s.x[0], dy = s.y[1] - s.y[0];
+        const float slope = std::abs(dy) > 1e-3f ? 1 / dy : 0;
+        const float low = std::max(std::min(y0, y0 + dy) - reach, 0.0f), high = std::min(std::max(y0, y0 + dy) + reach, kTile - 1.0f);
+        for (int y = int(low); y <= int(high); ++y) {
+            if (!row[y]) continue;
+            float from = 0, to = 1; // the part of the segment in the row
+            if (slope != 0) {
+                const float a = (y - reach - y0) * slope, b = (y + 1 + reach - y0) * slope;
+                from = std::max(0.0f, std::min(a, b)), to = std::min(1.0f, std::max(a, b));
+                if (from > to) continue;
+            }
+            const float a = x0 + dx * from, b = x0 + dx * to;
+            const int begin = int(std::min(std::max(std::min(a, b) - reach, 0.0f), float(kTile)));
+            const int end = int(std::max(std::min(std::max(a, b) + reach, kTile - 1.0f), -1.0f));
+            if (begin <= end && (row[y] & ((2u << end) - (1u << begin)))) return true;
+        }
+        return false;
+    }
+};
 
 /// Calls visit(tile column, tile row) for the tiles that a segment of half width `reach` [px] touches.
 template <class Visit> inline void visit_tiles(const View &view, const Segment &s, float reach, Visit &&visit) {

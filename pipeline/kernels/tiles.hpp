@@ -33,27 +33,34 @@ class Tile {
     static constexpr int kWindow = 2;
     static constexpr float kClosed = 1.0f / 256;
 
-    /// Draws the sorted entries; whether it may lack hair from behind `cut`.
-    bool draw(const View &view, const Bins &bins, const uint64_t *entry, size_t count, const Backdrop &back, int tile) {
+    /// Draws the sorted entries in the pixels that are wanted. Returns those that may lack hair from behind the cut-off.
+    TilePixels draw(const View &view, const Bins &bins, const uint64_t *entry, size_t count, const Backdrop &back, int tile,
+                    const TilePixels &wanted) {
         const int left = tile % view.across() * kTile, top = tile / view.across() * kTile;
+        drawn_ = wanted;
         begin(view, back, left, top);
+        // What was left out lies behind the cut-off: only what happens before it is certain
+        uint32_t certain;
+        std::memcpy(&certain, &bins.cut[tile], sizeof certain);
+        TilePixels lacking{};
+        bool passed = false;
         for (size_t k = 0; k < count && open_count_ > 0; ++k) {
+            if (!passed && entry[k] >> 32 > certain) lacking = open_beyond(bins.cut[tile]), passed = true;
             if (k + kAhead < count) __builtin_prefetch(&bins.segment(uint32_t(entry[k + kAhead])));
             segment(bins.segment(uint32_t(entry[k])), float(left), float(top), view, back);
         }
+        if (!passed) lacking = open_beyond(bins.cut[tile]);
         for (int p = 0; p < kPixels; ++p)
             for (int i = 0; i < held_[p]; ++i) composite(p, window_[p][i], view, back, left, top);
-        for (int p = 0; p < kPixels; ++p)
-            if (is_open(p) && farthest_[p] > bins.cut[tile]) return true;
-        return false;
+        return lacking;
     }
 
-    /// Writes the tile's pixels, linear RGB, into a picture (H, W, 3).
+    /// Writes the pixels that were drawn, linear RGB, into a picture (H, W, 3).
     void write(const View &view, const Backdrop &back, int tile, float *picture) const {
         const int left = tile % view.across() * kTile, top = tile / view.across() * kTile;
         for (int p = 0; p < kPixels; ++p) {
             const int x = left + p % kTile, y = top + p / kTile;
-            if (x >= view.W || y >= view.H) continue;
+            if (x >= view.W || y >= view.H || !(drawn_.row[p / kTile] >> (p % kTile) & 1)) continue;
             float behind[3];
             seen_behind(view, back, p, x, y, behind);
             float *to = picture + 3 * (size_t(y) * view.W + x);
@@ -73,8 +80,17 @@ class Tile {
     Fragment window_[kPixels][kWindow];
     uint8_t held_[kPixels];
     uint32_t open_rows_[kTile], open_columns_[kTile]; // a bit for each pixel that is open
+    TilePixels drawn_;
     int open_count_;
     CellCentres centres_;
+
+    /// The pixels that are open and see beyond a depth.
+    TilePixels open_beyond(float depth) const {
+        TilePixels pixels{};
+        for (int p = 0; p < kPixels; ++p)
+            if (is_open(p) && farthest_[p] > depth) pixels.row[p / kTile] |= 1u << p % kTile;
+        return pixels;
+    }
 
     bool is_open(int p) const { return open_rows_[p / kTile] >> (p % kTile) & 1; }
 
@@ -93,7 +109,7 @@ class Tile {
             T_[p] = splat(1.0f), clear_[p] = 1, held_[p] = 0;
             std::fill(colour_[p], colour_[p] + 3, 0.0f);
             nearest_[p] = 2, farthest_[p] = -1;
-            if (x >= view.W || y >= view.H) {
+            if (x >= view.W || y >= view.H || !(drawn_.row[p / kTile] >> (p % kTile) & 1)) {
                 close(p);
                 continue;
             }
