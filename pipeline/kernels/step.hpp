@@ -55,6 +55,7 @@ template <class Real> class Stepper {
         std::swap(now, other.now);
         std::swap(contacts.nearby, other.nearby);
         std::swap(contacts.phi, other.phi);
+        contacts.leave_cells(block.P);
     }
 
     void step(const Interval<Real> &interval, M wanted) {
