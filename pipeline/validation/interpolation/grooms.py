@@ -47,7 +47,6 @@ class Kind:
 KINDS = (
     Kind("straight", 0.0, 1.0, 32),
     Kind("wavy", 0.002, 0.04, 48),
-    Kind("wavy, random phase", 0.002, 0.04, 48, random_phase=True),
     Kind("curly", 0.005, 0.02, 64),
     Kind("curly, random phase", 0.005, 0.02, 64, random_phase=True),
     Kind("tight", 0.003, 0.005, 128),

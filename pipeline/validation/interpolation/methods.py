@@ -8,6 +8,7 @@ by minimal rotations, from a root segment that does not turn against the head.
     frame skinning       x_j = sum_g w_g (x_gj + A_gj (xbar_j - xbar_gj)), its segments brought back to their lengths
     strain increments    k_j = kbar_j + sum_g w_g (k_gj - kbar_gj), k_j the rotation vector from segment j-1 to j in F_{j-1};
                          against drift the tangents get what those of frame skinning, smoothed over a curl, are aside
+    internal forces      forces.py
 Sources: Hsu et al., "Real-time Physically Guided Hair Interpolation" (ACM TOG 43, 2024) for what is wrong with positions;
 Bergou et al., "Discrete Elastic Rods" (2008) for frames and strains. All strands and guides have one length.
 """
@@ -27,7 +28,7 @@ from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding, Expansion
 from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.strands.partings import Neighbours, Partings
-from pipeline.validation.interpolation.scene import Index, Scene
+from pipeline.validation.interpolation.scene import Index, Moment, Scene
 
 Floats = NDArray[np.float64]
 
@@ -77,48 +78,40 @@ class Following:
         return np.asarray(sum(each), np.float64)
 
 
-Method = Callable[[Following, Floats], Floats]
-"""Points (n, P, 3) [m] of the strands from those of their guides, (G, P, 3), in the head's frame."""
+Method = Callable[[Following, Moment], Floats]
+"""Points (n, P, 3) [m] of the strands in the head's frame, from their guides."""
 
 
-def tangent_rotation(to: Following, moved: Floats) -> Floats:
+def tangent_rotation(to: Following, guides: Moment) -> Floats:
     """What production does, with its kernels."""
     scene = to.scene
     expansion = Expansion(scene.points, scene.points[to.guides], to.binding, scene.field)
-    expansion.frame(moved.astype(np.float32), np.eye(4))
+    expansion.frame(guides.points.astype(np.float32), np.eye(4))
     return expansion.chunk(0, len(scene))[to.strands].astype(np.float64)
 
 
-def raw_positions(to: Following, moved: Floats) -> Floats:
+def raw_positions(to: Following, guides: Moment) -> Floats:
     """Blended displacements."""
-    return to.rest + to.mean(moved - to.guide_rest)
+    return to.rest + to.mean(guides.points - to.guide_rest)
 
 
-def frame_skinning(to: Following, moved: Floats) -> Floats:
+def frame_skinning(to: Following, guides: Moment) -> Floats:
     """Blended positions in the guides' turned frames, with lengths restored."""
-    turn = turns(to.guide_rest, moved)
+    turn = turns(to.guide_rest, guides.points)
     turn = np.concatenate([turn, turn[:, -1:]], axis=1)
-    offset = to.mean(moved - np.einsum("gpij,gpj->gpi", turn, to.guide_rest))
+    offset = to.mean(guides.points - np.einsum("gpij,gpj->gpi", turn, to.guide_rest))
     skinned = offset + np.einsum("npij,npj->npi", to.mean(turn), to.rest)
-    return _along(to, _tangents(skinned))
+    return _along(to, tangents(skinned))
 
 
-def strain_increments(to: Following, moved: Floats) -> Floats:
+def strain_increments(to: Following, guides: Moment) -> Floats:
     """The guides' changes of bend, added to the strands' own, with drift taken out."""
-    change = to.mean(_strains(_tangents(moved)) - _strains(_tangents(to.guide_rest)))
-    t = _tangents(to.rest)
+    change = to.mean(_strains(tangents(guides.points)) - _strains(tangents(to.guide_rest)))
+    t = tangents(to.rest)
     rebuilt = _rebuilt(t[:, 0], _strains(t) + change)
     reach = _DRIFT / float(np.linalg.norm(to.rest[:, 1:] - to.rest[:, :-1], axis=2).mean())
-    drift = gaussian_filter1d(_tangents(frame_skinning(to, moved)) - rebuilt, reach, axis=1, mode="nearest")
+    drift = gaussian_filter1d(tangents(frame_skinning(to, guides)) - rebuilt, reach, axis=1, mode="nearest")
     return _along(to, rebuilt + drift)
-
-
-METHODS: dict[str, Method] = {
-    "tangent rotation": tangent_rotation,
-    "frame skinning": frame_skinning,
-    "strain increments": strain_increments,
-    "raw positions": raw_positions,
-}
 
 
 def turns(rest: Floats, moved: Floats) -> Floats:
@@ -136,11 +129,12 @@ def turns(rest: Floats, moved: Floats) -> Floats:
     binding = Binding(probe, none, probe[:, None] % guides, one[:, None], probe, one, 0 * one)
     expansion = Expansion(probes.reshape(-1, points, 3), rest.astype(np.float32), binding)
     expansion.frame(moved.astype(np.float32), np.eye(4))
-    x, y = _tangents(expansion.chunk(0, len(binding)).astype(np.float64)).reshape(2, guides, points - 1, 3)
+    x, y = tangents(expansion.chunk(0, len(binding)).astype(np.float64)).reshape(2, guides, points - 1, 3)
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
-def _tangents(points: Floats) -> Floats:
+def tangents(points: Floats) -> Floats:
+    """Unit tangents (n, P-1, 3)."""
     edge = np.diff(points, axis=1)
     return np.asarray(edge / np.linalg.norm(edge, axis=2, keepdims=True))
 

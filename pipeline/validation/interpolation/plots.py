@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.cache import replacing
-from pipeline.validation.interpolation.methods import METHODS
-from pipeline.validation.interpolation.report import CHOICES, OURS, Report
+from pipeline.validation.interpolation.report import CHOICES, METHODS, OURS, Report
 from pipeline.validation.plots import need_matplotlib
 
-_COLOURS = ("#1b6ca8", "#e08e0b", "#5f6a6a", "#c0392b")
+_COLOURS = ("#1b6ca8", "#e08e0b", "#5f6a6a", "#c0392b", "#2e8b57")
 _LINES = {"none": "--", "grid": "-"}
 
 
@@ -49,7 +48,7 @@ def _guides(figure: Any, report: Report) -> None:
     ).ravel()
     for axes, kind in zip(grid, kinds, strict=False):
         for hair, line in _LINES.items():
-            for choice, colour in zip(CHOICES, _COLOURS, strict=False):
+            for choice, colour in zip(CHOICES if hair == "none" else CHOICES[:1], _COLOURS, strict=False):
                 rows = report.find(groom=kind.name, hair_on_hair=hair, choice=choice, method=OURS)
                 errors = [100 * row.error.mean for row in rows]
                 label = f"{choice}, {'hair on hair' if hair == 'grid' else 'without'}"

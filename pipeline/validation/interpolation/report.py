@@ -1,6 +1,6 @@
 """The report: kinds of hair x hair on hair or not x numbers and choices of guides x methods, and the floors below it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -9,15 +9,30 @@ from numpy.typing import NDArray
 
 from pipeline.groom.guides import choose_guides
 from pipeline.strands.random import uniform
+from pipeline.validation.interpolation.forces import internal_forces
 from pipeline.validation.interpolation.grooms import KINDS, Kind
 from pipeline.validation.interpolation.measures import Error, distance, error
-from pipeline.validation.interpolation.methods import METHODS, Following
-from pipeline.validation.interpolation.scene import HairOnHair, Index, Scene, scene
+from pipeline.validation.interpolation.methods import (
+    Following,
+    Method,
+    frame_skinning,
+    raw_positions,
+    strain_increments,
+    tangent_rotation,
+)
+from pipeline.validation.interpolation.scene import HairOnHair, Index, Moment, Scene, scene
 
 Floats = NDArray[np.float64]
 
 CHOICES = ("ours", "random")
 OURS = "tangent rotation"
+METHODS: dict[str, Method] = {
+    OURS: tangent_rotation,
+    "frame skinning": frame_skinning,
+    "strain increments": strain_increments,
+    "raw positions": raw_positions,
+    "internal forces": internal_forces,
+}
 
 
 @dataclass(frozen=True)
@@ -28,10 +43,12 @@ class Plan:
     strands: int
     guides: tuple[int, ...]
     """Numbers of guides, ascending."""
+    compared: tuple[int, ...]
+    """Those of them for which methods are compared."""
 
 
-FULL = Plan(KINDS, 2000, (50, 100, 200, 500, 1000))
-QUICK = Plan(tuple(kind for kind in KINDS if kind.name in ("straight", "curly")), 300, (50, 150))
+FULL = Plan(KINDS, 2000, (50, 100, 200, 500, 1000), (1000, 200))
+QUICK = Plan(tuple(kind for kind in KINDS if kind.name in ("straight", "curly")), 300, (50, 150), (150,))
 
 
 @dataclass(frozen=True)
@@ -53,10 +70,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Floor:
-    """What the simulation itself makes uncertain; mean distances over the length of a strand."""
+    """What hair on hair itself makes uncertain; mean distances over the length of a strand."""
 
     groom: str
-    hair_on_hair: HairOnHair
     moved: float
     """How far strands are from where they are at rest."""
     tremor: float
@@ -109,23 +125,47 @@ def chosen(hair: Scene, choice: str, count: int) -> Index:
 
 
 def _measured(plan: Plan, kind: Kind, hair: HairOnHair) -> Report:
-    hairs = scene(kind, plan.strands, hair)
+    where = scene(kind, plan.strands, hair)
     everyone = np.arange(plan.strands)
-    truth = hairs.moved(everyone)
+    truth = where.moved(everyone)
     rows: list[Row] = []
-    alone = 0.0
-    for choice in CHOICES:
+    floors: tuple[Floor, ...] = ()
+    if hair == "none":
+        for choice in CHOICES:
+            for count in plan.guides:
+                guides = chosen(where, choice, count)
+                # without hair on hair a strand does not know of the others
+                moved = [moment.of(guides) for moment in truth]
+                methods = tuple(METHODS) if choice == "ours" and count in plan.compared else (OURS,)
+                rows += _rows(kind, where, Following.of(where, guides), moved, truth, methods, choice)
+    else:
         for count in plan.guides:
-            guides = chosen(hairs, choice, count)
-            # without hair on hair a strand does not know of the others
-            moved = truth[:, guides] if hair == "none" else hairs.moved(guides)
-            if (choice, count) == ("ours", plan.guides[-1]):
-                alone = distance(moved, truth[:, guides])
-            following = Following.of(hairs, guides)
-            for method in METHODS if (choice, hair) == ("ours", "none") else (OURS,):
-                found = np.stack([METHODS[method](following, frame) for frame in moved])
-                how = error(kind, following.rest, found, truth[:, following.strands])
-                rows.append(Row(kind.name, hair, count, choice, method, how))
-    tremor = distance(hairs.moved(everyone, tremor=True), truth)
-    still = distance(np.broadcast_to(hairs.points, truth.shape), truth)
-    return Report(plan, tuple(rows), (Floor(kind.name, hair, still, tremor, alone),))
+            guides = chosen(where, "ours", count)
+            moved = where.moved(guides)
+            rows += _rows(kind, where, Following.of(where, guides), moved, truth, (OURS,), "ours")
+        alone = distance(_points(moved), _points(truth)[:, guides])
+        tremor = distance(_points(where.moved(everyone, tremor=True)), _points(truth))
+        still = distance(np.broadcast_to(where.points, _points(truth).shape), _points(truth))
+        floors = (Floor(kind.name, still, tremor, alone),)
+    return Report(plan, tuple(rows), floors)
+
+
+def _rows(
+    kind: Kind,
+    where: Scene,
+    following: Following,
+    moved: list[Moment],
+    truth: list[Moment],
+    methods: Sequence[str],
+    choice: str,
+) -> Iterator[Row]:
+    """One row for each method, from what the guides do."""
+    for method in methods:
+        found = np.stack([METHODS[method](following, moment) for moment in moved])
+        how = error(kind, following.rest, found, _points(truth)[:, following.strands])
+        hair = where.simulate.hair_contact.method
+        yield Row(kind.name, "grid" if hair == "grid" else "none", len(following.guides), choice, method, how)
+
+
+def _points(moments: list[Moment]) -> Floats:
+    return np.stack([moment.points for moment in moments])

@@ -23,9 +23,23 @@ Index = NDArray[np.int64]
 HairOnHair = Literal["grid", "none"]
 
 WHOLE_HEAD = 60_000  # strands that the scene's stand for
-_EVERY = 3  # frames from one that is looked at to the next
+_EVERY = 6  # frames from one that is looked at to the next
 _SECONDS, _SETTLE = 2.0, 1.0
 _TREMOR = 1e-6  # [m]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Strands in motion, in the frame of the head."""
+
+    points: Floats
+    """(n, P, 3) [m]."""
+    load: Floats
+    """(n, P, 3) [N]: what the strands' own forces bear: weight, inertia, air, contact."""
+
+    def of(self, strands: Index) -> "Moment":
+        """Some of the strands."""
+        return Moment(self.points[strands], self.load[strands])
 
 
 @dataclass(frozen=True)
@@ -43,28 +57,41 @@ class Scene:
     def __len__(self) -> int:
         return len(self.points)
 
-    def moved(self, strands: Index, tremor: bool = False) -> Floats:
-        """Points (F, n, P, 3) [m] of some strands in the head's frame, simulated without the others.
-
-        With a `tremor` they start a thousandth of a millimetre from where they are at rest.
-        """
+    def simulation(self, strands: Index) -> Simulation:
+        """Some strands, before they settle, and none of the others."""
         points = self.points[strands]
         held = held_ends(np.tile([2, 0], (len(points), 1)), points.shape[1])
         guides = Guides(points, held, self.offset[strands], self.field, strands=WHOLE_HEAD)
-        simulation = Simulation(self.simulate, 1, guides)
+        return Simulation(self.simulate, 1, guides)
+
+    def moved(self, strands: Index, tremor: bool = False) -> list[Moment]:
+        """Some strands, simulated without the others.
+
+        With a `tremor` they start a thousandth of a millimetre from where they are at rest.
+        """
+        simulation = self.simulation(strands)
+        points = simulation.state.points
         if tremor:
-            simulation.state.points[:, 2:] += _TREMOR * np.random.default_rng(1).normal(
-                size=points[:, 2:].shape
-            )
+            points[:, 2:] += _TREMOR * np.random.default_rng(1).normal(size=points[:, 2:].shape)
         simulation.settle()
-        frames = []
+        moments = []
         for frame in range(self.simulate.frames):
             if frame > 0:
                 simulation.next_frame()
             if frame % _EVERY == 0:
-                pose = simulation.frame().pose
-                frames.append((simulation.state.points - pose[:3, 3]) @ pose[:3, :3])
-        return np.stack(frames)
+                moments.append(_moment(simulation))
+        return moments
+
+
+def _moment(simulation: Simulation) -> Moment:
+    state, pose = simulation.state, simulation.frame().pose
+    points, directors = np.asarray(state.points, np.float64), np.asarray(state.directors, np.float64)
+    force = kernels.kirchhoff(points, directors, simulation.rest)[1]
+    edges = np.diff(points, axis=1)
+    pull = (state.tension / np.linalg.norm(edges, axis=2))[..., None] * edges
+    force[:, :-1] += pull
+    force[:, 1:] -= pull
+    return Moment((points - pose[:3, 3]) @ pose[:3, :3], -force @ pose[:3, :3])
 
 
 def scene(kind: Kind, strands: int, hair_on_hair: HairOnHair) -> Scene:
