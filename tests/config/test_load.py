@@ -124,7 +124,7 @@ def test_overrides_need_no_quotes_and_reach_into_lists(tmp_path: Path) -> None:
         ("[render]\nexposure = nan", "x.toml:2: render.exposure: expected to be a finite number, got NaN"),
         (
             '[render]\ngeometry = "tube"',
-            "x.toml:2: render.geometry: expected to be 'auto', 'tubes', 'ribbons' or 'lines', got \"tube\"",
+            "x.toml:2: render.geometry: expected to be 'auto', 'coverage', 'tubes', 'ribbons' or 'lines', got \"tube\"",
         ),
         ("[render]\nsize = [640]", "x.toml:2: render.size[1]: has to be set"),
         ("[[scene.lights]]\nirradiance = 1.0", "x.toml:1: scene.lights[0].direction: has to be set"),
