@@ -349,7 +349,7 @@ class Report:
     halvings: int
     """Steps that were taken again as two half steps."""
     bad_strand: int
-    """Index of the first strand that is no longer finite, or -1."""
+    """Index of the first strand that is no longer finite or torn (a segment below half or above 1.5 times its length), or -1."""
     seconds: float
     """Wall time of the call: the only number here that may differ between two equal calls, with the next one."""
     neighbour_seconds: float

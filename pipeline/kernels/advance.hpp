@@ -13,6 +13,9 @@
 
 namespace ringlet {
 
+/// A segment whose length is less or more than this part of what it should be is torn: no relaxation brings it back.
+inline constexpr double kShort = 0.5, kLong = 1.5;
+
 /// The caller's arrays of a state.
 template <class Real> struct StateArrays {
     Real *points, *velocity, *tension;
@@ -86,6 +89,24 @@ void write(const Motion<Real> &motion, StateArrays<Real> &state, int P, const Bl
     scatter<Real>(motion.twist + 1, state.twist, P - 2, index);
 }
 
+/// The first strand of a block that is torn, a segment half as long again or half as short as it should be, or that has
+/// a number that is not finite; -1 where there is none.
+template <class Real>
+int first_bad_strand(const Block<Real> &b, const Motion<Real> &motion, const BlockIndex<Real> &index) {
+    const Lanes<Real> most = splat(std::numeric_limits<Real>::max()), none = splat(Real(0));
+    Mask<Real> good = none == none;
+    for (int i = 0; i < b.P; ++i) {
+        for (Lanes<Real> v : {motion.v[i].x, motion.v[i].y, motion.v[i].z}) good &= (v <= most) & (v >= -most);
+        if (i == b.P - 1) break;
+        const Vec3<Real> edge = motion.x[i + 1] - motion.x[i];
+        const Lanes<Real> part = dot(edge, edge) * b.inverse_l[i] * b.inverse_l[i];
+        good &= (part > Real(kShort * kShort)) & (part < Real(kLong * kLong));
+    }
+    for (int lane = 0; lane < index.count; ++lane)
+        if (!good[lane]) return index.begin + lane;
+    return -1;
+}
+
 /// Lanes that hold a strand of their own (the last block repeats its last strand).
 template <class Real> Mask<Real> own_lanes(const BlockIndex<Real> &index) {
     Mask<Real> own{};
@@ -104,6 +125,7 @@ void advance_block(Stepper<Real> &stepper, const BlockIndex<Real> &index, StateA
     RootPose<Real> roots[2];
     for (int k = 0; k < drive.steps; ++k)
         stepper.step(interval_of(drive, k, settings, rest.S, index, roots), own_lanes(index));
+    stepper.tally.bad_strand = first_bad_strand(stepper.block, stepper.now, index);
     write(stepper.now, state, rest.P, index);
 }
 
@@ -119,21 +141,9 @@ template <class Real> Report summarise(const std::vector<Tally<Real>> &tallies, 
         report.contacts += tally.contacts / std::max(1, steps);
         report.halvings += tally.halvings;
         report.rounds_max = std::max(report.rounds_max, tally.rounds_max);
+        if (report.bad_strand < 0) report.bad_strand = tally.bad_strand;
     }
     return report;
-}
-
-/// Index of the first strand with a number that is not finite, or -1.
-template <class Real> int first_bad_strand(const StateArrays<Real> &state, int S, int P) {
-    constexpr Real most = std::numeric_limits<Real>::max();
-    const int row = P * 3;
-    for (int s = 0; s < S; ++s) {
-        const Real *x = state.points + size_t(s) * row, *v = state.velocity + size_t(s) * row;
-        int bad = 0; // no way out inside a strand, so that many numbers are looked at side by side
-        for (int k = 0; k < row; ++k) bad |= !(std::abs(x[k]) <= most) | !(std::abs(v[k]) <= most);
-        if (bad) return s;
-    }
-    return -1;
 }
 
 /// Advances the state in place by the steps of the drive.
@@ -152,9 +162,7 @@ Report advance(StateArrays<Real> state, const RestShape &rest, const DistanceFie
             tallies[block] = stepper.tally;
         }
     }
-    Report report = summarise(tallies, drive.steps);
-    report.bad_strand = first_bad_strand(state, rest.S, rest.P);
-    return report;
+    return summarise(tallies, drive.steps);
 }
 
 } // namespace ringlet

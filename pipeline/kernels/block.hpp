@@ -5,19 +5,22 @@
 #pragma once
 
 #include "rest.hpp"
-#include "simd.hpp"
+#include "rows.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <new>
+#include <vector>
 
 namespace ringlet {
 
-/// Memory of one thread: handed out in aligned pieces, given back all at once.
+/// Memory of one thread: handed out in aligned pieces, given back all at once. The thread keeps it for its next arenas:
+/// fresh pages from the system cost a twentieth of a frame's steps.
 class Arena {
   public:
-    explicit Arena(size_t bytes) : memory_(static_cast<std::byte *>(::operator new(bytes, kAlignment))), left_(bytes) {}
+    explicit Arena(size_t bytes) : memory_(kept(bytes)), left_(bytes) {}
 
     template <class T> T *take(size_t count) {
         size_t bytes = (count * sizeof(T) + size_t(kAlignment) - 1) / size_t(kAlignment) * size_t(kAlignment);
@@ -31,11 +34,41 @@ class Arena {
 
   private:
     static constexpr std::align_val_t kAlignment{64};
+    static constexpr size_t kKept = 4; // pieces that a thread keeps
+
     struct Free {
         void operator()(std::byte *p) const { ::operator delete(p, kAlignment); }
     };
-    std::unique_ptr<std::byte, Free> memory_;
+    struct Piece {
+        std::unique_ptr<std::byte, Free> memory;
+        size_t bytes;
+    };
+    /// The pieces that a thread keeps, smallest first; its own: an arena may be given back by another thread.
+    static std::vector<Piece> &pieces() {
+        static thread_local std::vector<Piece> pieces;
+        return pieces;
+    }
+    struct Keep {
+        size_t bytes = 0;
+        void operator()(std::byte *p) const {
+            std::vector<Piece> &all = pieces();
+            const auto larger = [this](const Piece &piece) { return piece.bytes > bytes; };
+            all.insert(std::find_if(all.begin(), all.end(), larger), Piece{std::unique_ptr<std::byte, Free>(p), bytes});
+            if (all.size() > kKept) all.erase(all.begin());
+        }
+    };
+    std::unique_ptr<std::byte, Keep> memory_;
     size_t used_ = 0, left_;
+
+    static std::unique_ptr<std::byte, Keep> kept(size_t bytes) {
+        std::vector<Piece> &all = pieces();
+        const auto fits = std::find_if(all.begin(), all.end(), [&](const Piece &piece) { return piece.bytes >= bytes; });
+        if (fits == all.end())
+            return {static_cast<std::byte *>(::operator new(bytes, kAlignment)), Keep{bytes}};
+        std::unique_ptr<std::byte, Keep> piece(fits->memory.release(), Keep{fits->bytes});
+        all.erase(fits);
+        return piece;
+    }
 };
 
 /// What a step changes.
@@ -49,6 +82,9 @@ template <class Real> struct Motion {
     Motion(Arena &arena, int P)
         : x(arena.take<Vec3<Real>>(P)), v(arena.take<Vec3<Real>>(P)), m(arena.take<Vec3<Real>>(P)),
           twist(arena.take<Lanes<Real>>(P)), T(arena.take<Lanes<Real>>(P)), touch(arena.take<Lanes<Real>>(P)) {}
+
+    /// Bytes that a Motion takes from its arena.
+    static size_t bytes(int P) { return sizeof(Lanes<Real>) * 12 * size_t(P); }
 };
 
 /// What a step reads: the rest shape of the block's strands.
@@ -85,22 +121,24 @@ template <class Real> struct Block {
 /// Strand s begins at source + s * stride.
 template <class Real, class Source>
 void gather(Lanes<Real> *to, const Source *source, int count, int stride, const int (&strand)[kLanes<Real>]) {
-    for (int lane = 0; lane < kLanes<Real>; ++lane) {
-        const Source *from = source + size_t(strand[lane]) * stride;
-        for (int i = 0; i < count; ++i) to[i][lane] = Real(from[i]);
+    constexpr int n = kLanes<Real>;
+    for (int first = 0; first < count; first += n) {
+        if (count < n) {
+            for (int lane = 0; lane < n; ++lane)
+                for (int i = 0; i < count; ++i) to[i][lane] = Real(source[size_t(strand[lane]) * stride + i]);
+            return;
+        }
+        const int begin = std::min(first, count - n); // the last piece overlaps the one before
+        Lanes<Real> rows[n];
+        for (int lane = 0; lane < n; ++lane) rows[lane] = load_row<Real>(source + size_t(strand[lane]) * stride + begin);
+        transpose<Real>(rows);
+        for (int i = 0; i < n; ++i) to[begin + i] = rows[i];
     }
 }
 
 template <class Real, class Source>
 void gather(Vec3<Real> *to, const Source *source, int count, const int (&strand)[kLanes<Real>]) {
-    for (int lane = 0; lane < kLanes<Real>; ++lane) {
-        const Source *from = source + size_t(strand[lane]) * count * 3;
-        for (int i = 0; i < count; ++i, from += 3) {
-            to[i].x[lane] = Real(from[0]);
-            to[i].y[lane] = Real(from[1]);
-            to[i].z[lane] = Real(from[2]);
-        }
-    }
+    gather<Real>(&to->x, source, 3 * count, 3 * count, strand);
 }
 
 /// The strands of a block: its lanes from `begin`; the last block is filled up with copies of its last strand.
@@ -117,22 +155,25 @@ template <class Real> int block_count(int strands) { return (strands + kLanes<Re
 
 template <class Real, class T>
 void scatter(const Lanes<Real> *from, T *target, int count, const BlockIndex<Real> &index) {
-    for (int lane = 0; lane < index.count; ++lane) {
-        T *to = target + size_t(index.begin + lane) * count;
-        for (int i = 0; i < count; ++i) to[i] = T(from[i][lane]);
+    constexpr int n = kLanes<Real>;
+    T *to = target + size_t(index.begin) * count;
+    for (int first = 0; first < count; first += n) {
+        if (count < n) {
+            for (int lane = 0; lane < index.count; ++lane)
+                for (int i = 0; i < count; ++i) to[size_t(lane) * count + i] = T(from[i][lane]);
+            return;
+        }
+        const int begin = std::min(first, count - n);
+        Lanes<Real> rows[n];
+        for (int i = 0; i < n; ++i) rows[i] = from[begin + i];
+        transpose<Real>(rows);
+        for (int lane = 0; lane < index.count; ++lane) store_row<Real>(rows[lane], to + size_t(lane) * count + begin);
     }
 }
 
 template <class Real, class T>
 void scatter(const Vec3<Real> *from, T *target, int count, const BlockIndex<Real> &index) {
-    for (int lane = 0; lane < index.count; ++lane) {
-        T *to = target + size_t(index.begin + lane) * count * 3;
-        for (int i = 0; i < count; ++i, to += 3) {
-            to[0] = T(from[i].x[lane]);
-            to[1] = T(from[i].y[lane]);
-            to[2] = T(from[i].z[lane]);
-        }
-    }
+    scatter<Real>(&from->x, target, 3 * count, index);
 }
 
 /// The bend that a clamped root keeps: the second segment seen in the frame of the first, at rest, and its shift.
@@ -157,12 +198,10 @@ template <class Real> void derive(Block<Real> &b, const RestShape &rest, const i
     b.m0 = sum / Real(b.P), b.per_mass = 1 / b.m0;
     bool leading = true;
     b.first = 0, b.held_inside = false;
+    gather<Real>(b.hand, rest.held.data(), b.P, b.P, strand);
     for (int i = 0; i < b.P; ++i) {
-        for (int lane = 0; lane < kLanes<Real>; ++lane) {
-            uint8_t held = rest.held[size_t(strand[lane]) * b.P + i];
-            b.free[i][lane] = held == 0;
-            b.hand[i][lane] = held == 2;
-        }
+        b.free[i] = select<Real>(b.hand[i] == none, one, none);
+        b.hand[i] = select<Real>(b.hand[i] == splat(Real(2)), one, none);
         b.mu[i] = b.mu[i] / b.m0;
         b.w[i] = b.free[i] / b.mu[i];
         leading = leading && !any<Real>(b.free[i] > none);
@@ -178,6 +217,25 @@ template <class Real> void derive(Block<Real> &b, const RestShape &rest, const i
     }
 }
 
+/// Cosine and sine to the last bits: series for a quarter of the angle, and the double angle twice.
+template <class Real>
+RINGLET_INLINE void cosine_and_sine(Lanes<Real> angle, Lanes<Real> &cosine, Lanes<Real> &sine) {
+    constexpr double turn = 6.28318530717958647692;
+    const Lanes<Real> u = Real(0.25) * (angle - Real(turn) * nearest<Real>(angle * Real(1 / turn))), z = u * u;
+    Lanes<Real> less = splat(Real(0)), s = splat(Real(0)); // 1 - cos(u), sin(u) / u - 1
+    for (int k = 8; k >= 1; --k) {
+        less = z * Real(1.0 / (2 * k * (2 * k - 1))) * (1 - less);
+        s = z * Real(-1.0 / (2 * k * (2 * k + 1))) * (1 + s);
+    }
+    s = u + u * s;
+    for (int twice = 0; twice < 2; ++twice) {
+        const Lanes<Real> doubled = 2 * s * (1 - less);
+        less = 2 * s * s;
+        s = doubled;
+    }
+    cosine = 1 - less, sine = s;
+}
+
 /// Reads what "rotor" and "frenet" keep: rest curvature and torsion, and the dihedrals about segments with their weights.
 template <class Real> void read_curves(Block<Real> &b, const RestShape &rest, const int (&strand)[kLanes<Real>]) {
     const int P = b.P;
@@ -186,12 +244,11 @@ template <class Real> void read_curves(Block<Real> &b, const RestShape &rest, co
     gather<Real>(b.G_after + 1, rest.ratio.data(), P - 3, P - 3, strand);
     gather<Real>(b.G_before + 1, rest.weight.data(), P - 3, P - 3, strand);
     gather<Real>(b.C + 1, rest.dihedral.data(), P - 3, P - 3, strand);
-    for (int i = 1; i < P - 2; ++i)
-        for (int lane = 0; lane < kLanes<Real>; ++lane) {
-            const Real phi = b.C[i][lane], G = b.G_before[i][lane], rho = b.G_after[i][lane];
-            b.C[i][lane] = std::cos(phi), b.S[i][lane] = std::sin(phi);
-            b.G_before[i][lane] = std::sqrt(G * rho), b.G_after[i][lane] = std::sqrt(G / rho);
-        }
+    for (int i = 1; i < P - 2; ++i) {
+        const Lanes<Real> G = b.G_before[i], rho = b.G_after[i];
+        cosine_and_sine<Real>(b.C[i], b.C[i], b.S[i]);
+        b.G_before[i] = square_root<Real>(G * rho), b.G_after[i] = square_root<Real>(G / rho);
+    }
 }
 
 /// Reads the rest shape of a block of strands; without curves, what "kirchhoff" needs.

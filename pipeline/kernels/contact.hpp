@@ -50,6 +50,18 @@ template <class Real> struct HeadStep {
         if (deformation) measure_deformed(at, phi, gradient);
     }
 
+    /// The same with the corners of the cells that were read last: points seldom leave their cells.
+    __attribute__((noinline)) void measure(Vec3<Real> at, Mask<Real> &last, Corners<Real> &corners, L &phi,
+                                           Vec3<Real> &gradient) const {
+        const Cells<Real> cells(*field, at);
+        if (any<Real>(cells.at != last)) {
+            corners.read(*field, cells.at);
+            last = cells.at;
+        }
+        corners.interpolate(cells, phi, gradient);
+        if (deformation) measure_deformed(at, phi, gradient);
+    }
+
     /// Where points that touch the skin would be if they had moved with it during the step.
     RINGLET_INLINE Vec3<Real> carried(Vec3<Real> old) const { return deformation ? carried_deformed(old) : carry(old); }
 
@@ -88,18 +100,27 @@ template <class Real> struct Contacts {
     Vec3<Real> *n, *nearby;    // normal of the contact; place of the last sample in the head's frame
     Vec3<Real> *start;         // where the step begins, in the head's frame
     L *phi;                    // distance there
+    Mask<Real> *cell;          // its cell in the field, -1 for none, and what was read there
+    Corners<Real> *corners;
     L *row, *gap, *N;          // rows: 1 where one acts, g', contact force of the solve
     L *a, *s, *fresh, *stuck;  // rounds: contact holds, worth, new part of s, held by friction
     bool any_row = false;
 
     Contacts(Arena &arena, int P)
-        : n(arena.take<Vec3<Real>>(P)), nearby(arena.take<Vec3<Real>>(P)), start(arena.take<Vec3<Real>>(P)) {
+        : n(arena.take<Vec3<Real>>(P)), nearby(arena.take<Vec3<Real>>(P)), start(arena.take<Vec3<Real>>(P)),
+          cell(arena.take<Mask<Real>>(P)), corners(arena.take<Corners<Real>>(P)) {
         for (auto **array : {&phi, &row, &gap, &N, &a, &s, &fresh, &stuck}) *array = arena.take<L>(P);
     }
 
     /// Forgets the samples: nothing is known to be far.
     void forget(int P) {
         for (int i = 0; i < P; ++i) phi[i] = splat(Real(-1e3)), nearby[i] = Vec3<Real>{};
+        leave_cells(P);
+    }
+
+    /// Other strands come, whose points lie in other cells.
+    void leave_cells(int P) {
+        for (int i = 0; i < P; ++i) cell[i] = Mask<Real>{} - 1;
     }
 
     /// The skin may have come nearer by so much [m] since the samples.
@@ -116,7 +137,7 @@ template <class Real> struct Contacts {
         const L room = phi[i] - reach;
         const Real slope = Real(head.steepest);
         if (!any<Real>(of & ~((room > none) & (room * room > slope * slope * square)))) return false;
-        head.measure(at, distance, normal);
+        head.measure(at, cell[i], corners[i], distance, normal);
         nearby[i] = at, phi[i] = distance;
         const Vec3<Real> way = at - start[i];
         const Real far = Real(kWay * head.field->spacing);

@@ -72,39 +72,62 @@ struct DistanceField {
     }
 };
 
+/// The cells that points of the head's rest frame lie in: number of the first corner, and how far along each axis.
+/// Not-a-number lies in the grid's first cell.
+template <class Real> struct Cells {
+    Mask<Real> at;
+    Lanes<Real> along[3];
+
+    RINGLET_INLINE Cells(const DistanceField &field, Vec3<Real> x) {
+        const Real inverse = Real(1 / field.spacing);
+        const Lanes<Real> zero = splat(Real(0)), part[3] = {x.x, x.y, x.z};
+        Mask<Real> whole[3];
+        for (int k = 0; k < 3; ++k) {
+            const Lanes<Real> u = (part[k] - Real(field.origin[k])) * inverse;
+            const Lanes<Real> inside = select<Real>(u >= zero, minimum<Real>(u, splat(field.n[k] - Real(1.001))), zero);
+            whole[k] = __builtin_convertvector(inside, Mask<Real>);
+            along[k] = inside - __builtin_convertvector(whole[k], Lanes<Real>);
+        }
+        at = (whole[0] * field.n[1] + whole[1]) * field.n[2] + whole[2];
+    }
+};
+
+/// The distances at the eight corners of cells; the last axis goes fastest.
+template <class Real> struct Corners {
+    Lanes<Real> value[8];
+
+    /// Reads those of cells.
+    __attribute__((noinline)) void read(const DistanceField &field, Mask<Real> at) {
+        const int nz = field.n[2], row = field.n[1] * nz;
+        const float *values = field.values.data();
+        gather_pairs<Real>(values, at, value[0], value[1]);
+        gather_pairs<Real>(values + nz, at, value[2], value[3]);
+        gather_pairs<Real>(values + row, at, value[4], value[5]);
+        gather_pairs<Real>(values + row + nz, at, value[6], value[7]);
+    }
+
+    /// Distance phi and its gradient (not normalised) in the cells: the derivative of the same interpolant.
+    RINGLET_INLINE void interpolate(const Cells<Real> &cells, Lanes<Real> &phi, Vec3<Real> &gradient) const {
+        using L = Lanes<Real>;
+        const L *v = value, fa = cells.along[0], fb = cells.along[1], fc = cells.along[2];
+        // along z, then y, then x
+        const L d00 = v[1] - v[0], d01 = v[3] - v[2], d10 = v[5] - v[4], d11 = v[7] - v[6];
+        const L z00 = v[0] + fc * d00, z01 = v[2] + fc * d01, z10 = v[4] + fc * d10, z11 = v[6] + fc * d11;
+        const L e0 = z01 - z00, e1 = z11 - z10, y0 = z00 + fb * e0, y1 = z10 + fb * e1;
+        const L d0 = d00 + fb * (d01 - d00), d1 = d10 + fb * (d11 - d10);
+        phi = y0 + fa * (y1 - y0);
+        gradient = {y1 - y0, e0 + fa * (e1 - e0), d0 + fa * (d1 - d0)};
+    }
+};
+
 /// Distance phi and its gradient (not normalised) at points of the head's rest frame. Not-a-number gives the value at
 /// the grid's first corner, never a read outside the grid.
 template <class Real>
-__attribute__((noinline)) void sample(const DistanceField &field, Vec3<Real> x, Lanes<Real> &phi,
-                                      Vec3<Real> &gradient) {
-    using L = Lanes<Real>;
-    const int ny = field.n[1], nz = field.n[2], row = ny * nz;
-    const Real inverse = Real(1 / field.spacing);
-    const L zero = splat(Real(0));
-    const auto clamped = [&](L u, int n) RINGLET_ALWAYS {
-        return select<Real>(u >= zero, minimum<Real>(u, splat(n - Real(1.001))), zero);
-    };
-    const L a = clamped((x.x - Real(field.origin[0])) * inverse, field.n[0]);
-    const L b = clamped((x.y - Real(field.origin[1])) * inverse, ny);
-    const L c = clamped((x.z - Real(field.origin[2])) * inverse, nz);
-    const Mask<Real> ia = __builtin_convertvector(a, Mask<Real>), ib = __builtin_convertvector(b, Mask<Real>),
-                     ic = __builtin_convertvector(c, Mask<Real>);
-    const Mask<Real> at = (ia * ny + ib) * nz + ic;
-    const L fa = a - __builtin_convertvector(ia, L), fb = b - __builtin_convertvector(ib, L),
-            fc = c - __builtin_convertvector(ic, L);
-    const float *values = field.values.data();
-    L v000, v001, v010, v011, v100, v101, v110, v111;
-    gather_pairs<Real>(values, at, v000, v001);
-    gather_pairs<Real>(values + nz, at, v010, v011);
-    gather_pairs<Real>(values + row, at, v100, v101);
-    gather_pairs<Real>(values + row + nz, at, v110, v111);
-    // along z, then y, then x; the gradient is the derivative of the same interpolant
-    const L d00 = v001 - v000, d01 = v011 - v010, d10 = v101 - v100, d11 = v111 - v110;
-    const L z00 = v000 + fc * d00, z01 = v010 + fc * d01, z10 = v100 + fc * d10, z11 = v110 + fc * d11;
-    const L e0 = z01 - z00, e1 = z11 - z10, y0 = z00 + fb * e0, y1 = z10 + fb * e1;
-    const L d0 = d00 + fb * (d01 - d00), d1 = d10 + fb * (d11 - d10);
-    phi = y0 + fa * (y1 - y0);
-    gradient = {y1 - y0, e0 + fa * (e1 - e0), d0 + fa * (d1 - d0)};
+__attribute__((noinline)) void sample(const DistanceField &field, Vec3<Real> x, Lanes<Real> &phi, Vec3<Real> &gradient) {
+    const Cells<Real> cells(field, x);
+    Corners<Real> corners;
+    corners.read(field, cells.at);
+    corners.interpolate(cells, phi, gradient);
 }
 
 /// A number that the distance at x, as `sample` gives it, is not below: one read of a table that stays near the

@@ -30,12 +30,6 @@ template <class Real> inline constexpr Real kFold = sizeof(Real) == 4 ? Real(1e-
 template <class Real> inline constexpr Real kLeastTwisting = sizeof(Real) == 4 ? Real(1e-5) : Real(1e-9);
 inline constexpr double kLeastSpin = 1e-9;
 
-/// x rounded to the nearest integer: adding 1.5 2^52 (2^23) leaves no digits after the point.
-template <class Real> RINGLET_INLINE Lanes<Real> nearest(Lanes<Real> x) {
-    constexpr Real shift = sizeof(Real) == 4 ? Real(12582912.0) : Real(6755399441055744.0);
-    return (x + shift) - shift;
-}
-
 /// arctan(u) to 4e-16 for |u| <= tan(pi/8).
 template <class Real> RINGLET_INLINE Lanes<Real> arc_tangent(Lanes<Real> u) {
     const Lanes<Real> z = u * u;

@@ -92,6 +92,12 @@ template <class Real> RINGLET_INLINE Lanes<Real> maximum(Lanes<Real> a, Lanes<Re
 
 template <class Real> RINGLET_INLINE Lanes<Real> minimum(Lanes<Real> a, Lanes<Real> b) { return a < b ? a : b; }
 
+/// x rounded to the nearest integer: adding 1.5 2^52 (2^23) leaves no digits after the point.
+template <class Real> RINGLET_INLINE Lanes<Real> nearest(Lanes<Real> x) {
+    constexpr Real shift = sizeof(Real) == 4 ? Real(12582912.0) : Real(6755399441055744.0);
+    return (x + shift) - shift;
+}
+
 /// A bit for each lane that is set.
 template <class Real> RINGLET_INLINE uint32_t set_lanes(Mask<Real> mask) {
 #ifdef __AVX512F__

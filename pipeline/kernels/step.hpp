@@ -21,7 +21,7 @@ inline constexpr int kHalvings = 6, kResolves = 2;
 template <class Real> struct Tally {
     Lanes<Real> strain{}, depth{};
     long rounds = 0, solves = 0, halvings = 0;
-    int rounds_max = 0;
+    int rounds_max = 0, bad_strand = -1;
     double contacts = 0;
 };
 
@@ -41,13 +41,12 @@ template <class Real> class Stepper {
         : block(arena, P), now(arena, P), contacts(arena, P), settings_(settings), field_(field), next_(arena, P),
           edges_(arena, P), lengths_(arena, P), directors_(arena, P), ahead_(arena, P), solvers_(arena, P, settings.torsion),
           f_(arena.take<Vec3<Real>>(P)), u_(arena.take<Vec3<Real>>(P)), star_(arena.take<Vec3<Real>>(P)) {
-        for (int depth = 0; depth < 2 * kHalvings; ++depth) halves_.emplace_back(arena, P);
     }
 
     /// Bytes that a Stepper takes from its arena.
     static size_t bytes(int P) {
-        constexpr size_t pivots = 2 * (4 * 15 + 8), motions = 2 + 2 * kHalvings, points = 128;
-        return sizeof(L) * ((pivots + 12 * motions + points) * P + 4096);
+        constexpr size_t pivots = 2 * (4 * 15 + 8), motions = 2, points = 128;
+        return sizeof(L) * ((pivots + points) * P + 4096) + motions * Motion<Real>::bytes(P);
     }
 
     /// Takes a block of strands in, or gives it back after the step.
@@ -56,6 +55,7 @@ template <class Real> class Stepper {
         std::swap(now, other.now);
         std::swap(contacts.nearby, other.nearby);
         std::swap(contacts.phi, other.phi);
+        contacts.leave_cells(block.P);
     }
 
     void step(const Interval<Real> &interval, M wanted) {
@@ -76,6 +76,7 @@ template <class Real> class Stepper {
     const StepSettings &settings_;
     const DistanceField *field_;
     Motion<Real> next_;
+    std::unique_ptr<Arena> spare_;      // memory of halved steps, once there is one
     std::vector<Motion<Real>> halves_;
     Edges<Real> edges_;
     Lengths<Real> lengths_;
@@ -100,6 +101,7 @@ template <class Real> class Stepper {
             stand_still(interval, from, to, failed);
             return;
         }
+        if (!spare_) make_halves();
         Motion<Real> &middle = halves_[2 * depth], &end = halves_[2 * depth + 1];
         advance(interval.halved(false), from, middle, failed, depth + 1);
         advance(interval.halved(true), middle, end, failed, depth + 1);
@@ -111,6 +113,11 @@ template <class Real> class Stepper {
             to.m[i] = select(failed, end.m[i], to.m[i]);
             to.twist[i] = select<Real>(failed, end.twist[i], to.twist[i]);
         }
+    }
+
+    void make_halves() {
+        spare_ = std::make_unique<Arena>(2 * kHalvings * Motion<Real>::bytes(block.P));
+        for (int k = 0; k < 2 * kHalvings; ++k) halves_.emplace_back(*spare_, block.P);
     }
 
     /// What no step can take, because contacts leave no room for the strand, keeps its shape and follows its root:

@@ -64,7 +64,6 @@ template <class Real> class Together {
             looking = look;
         }
         Report report = summarise(tallies_, drive_.steps);
-        report.bad_strand = first_bad_strand(state_, rest_.S, rest_.P);
         report.neighbour_seconds = looking + acting / threads;
         return report;
     }
@@ -132,7 +131,11 @@ template <class Real> class Together {
 
     void write_blocks() {
 #pragma omp for schedule(static)
-        for (int b = 0; b < int(blocks_.size()); ++b) write(blocks_[b]->now, state_, rest_.P, blocks_[b]->index);
+        for (int b = 0; b < int(blocks_.size()); ++b) {
+            const Resident<Real> &resident = *blocks_[b];
+            tallies_[b].bad_strand = first_bad_strand(resident.block, resident.now, resident.index);
+            write(resident.now, state_, rest_.P, resident.index);
+        }
     }
 };
 

@@ -21,23 +21,25 @@ Vector = NDArray[np.float64]
 Pose = NDArray[np.float64]
 
 _SMALL = 1e-3  # angles squared below this take a series
+_EYE = np.eye(3)
 
 
 def cross_matrix(vector: Vector) -> Vector:
     """(..., 3, 3) of vectors (..., 3), so that its product with x is vector x x."""
-    x, y, z = np.moveaxis(np.asarray(vector, np.float64), -1, 0)
-    none = np.zeros_like(x)
-    rows = [np.stack(row, axis=-1) for row in ((none, -z, y), (z, none, -x), (-y, x, none))]
-    return np.stack(rows, axis=-2)
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    matrix = np.zeros((*vector.shape, 3))
+    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
+    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
+    return matrix
 
 
 def rotation_matrix(vector: Vector) -> Vector:
     """The rotation about an axis by an angle, `vector` = axis times angle (..., 3) [rad], (..., 3, 3) (Rodrigues, 1840)."""
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    angle = np.sqrt((vector * vector).sum(axis=-1))[..., None, None] + 1e-150  # 0 / 0 is 1 here
     cross = cross_matrix(vector)
-    sine = np.sinc(angle / np.pi)
-    versine = np.sinc(angle / (2 * np.pi)) ** 2 / 2
-    return np.asarray(np.eye(3) + sine * cross + versine * cross @ cross)
+    sine = np.sin(angle) / angle
+    versine = (np.sin(angle / 2) / angle) ** 2 * 2
+    return np.asarray(_EYE + sine * cross + versine * cross @ cross)
 
 
 def rotation_vector(rotation: Vector) -> Vector:
@@ -51,8 +53,9 @@ def rotation_vector(rotation: Vector) -> Vector:
 def rigid(rotation: Vector, translation: Vector, pivot: Vector | None = None) -> Pose:
     """A turn by the rotation vector `rotation` about `pivot`, then a translation: poses (..., 4, 4)."""
     turn = rotation_matrix(rotation)
-    centre = np.zeros_like(rotation) if pivot is None else np.broadcast_to(pivot, rotation.shape)
-    return assembled(turn, centre + translation - _turned(turn, centre))
+    if pivot is not None:
+        translation = translation + pivot - _turned(turn, pivot)
+    return assembled(turn, translation)
 
 
 def assembled(rotation: Vector, translation: Vector) -> Pose:

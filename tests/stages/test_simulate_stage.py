@@ -171,7 +171,7 @@ def test_torn_strands_count_as_diverged(guides: Guides) -> None:
     simulation.settle()
     simulation.state.points[7, 4:] += 50.0
     with pytest.raises(SimulationDiverged, match="guide 7"):
-        simulation.check()
+        simulation.next_frame()
 
 
 # --- with files -----------------------------------------------------------------------------------
