@@ -132,8 +132,9 @@ template <class Real> class Together {
     void write_blocks() {
 #pragma omp for schedule(static)
         for (int b = 0; b < int(blocks_.size()); ++b) {
-            tallies_[b].bad_strand = first_bad_strand(blocks_[b]->block, blocks_[b]->now, blocks_[b]->index);
-            write(blocks_[b]->now, state_, rest_.P, blocks_[b]->index);
+            const Resident<Real> &resident = *blocks_[b];
+            tallies_[b].bad_strand = first_bad_strand(resident.block, resident.now, resident.index);
+            write(resident.now, state_, rest_.P, resident.index);
         }
     }
 };
