@@ -66,7 +66,7 @@ def read_apart(path: Path) -> Ragged:
     limits = Limits.of(path)
     root = str(Path(pipeline.__file__).parents[1])
     search = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
-    command = [sys.executable, "-m", "pipeline.strands.formats", str(path)]
+    command = [sys.executable, "-P", "-m", "pipeline.strands.formats", str(path)]
     try:
         child = subprocess.run(
             command,
