@@ -42,6 +42,7 @@ def examine() -> list[Check]:
         _memory,
         _disk,
         _movie,
+        _formats,
     )
     return [check() for check in checks]
 
@@ -112,6 +113,18 @@ def _movie() -> Check:
     if importlib.util.find_spec("av"):
         return Check("movie", True, "PyAV writes .mp4")
     return Check("movie", True, 'animated PNG only; pip install "ringlet[movie]" for .mp4')
+
+
+def _formats() -> Check:
+    import importlib.util
+
+    extras = {"usd": "pxr", "alembic": "alembic3d"}
+    missing = [extra for extra, module in extras.items() if not importlib.util.find_spec(module)]
+    if not missing:
+        return Check("formats", True, "USD and Alembic beside .tfx, .hair, .data and VTK")
+    return Check(
+        "formats", True, f'.tfx, .hair, .data and VTK; pip install "ringlet[{",".join(missing)}]" for more'
+    )
 
 
 def _first_line(command: list[str]) -> str | None:

@@ -295,6 +295,40 @@ def test_chunks_become_prims_or_pieces_of_one_array(tmp_path: Path) -> None:
         assert set(read.widths[ends]) == {1}
 
 
+def test_uvs_of_roots_go_with_their_strands(tmp_path: Path) -> None:
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
+
+    uv = np.random.default_rng(1).random((50, 2), np.float32)
+    lines = Lines(50, 4, np.full(4, 1e-4, np.float32), 24, "about", uv)
+    write_vtp(tmp_path / "a.vtp", lines, chunks(50, 20, 4))
+    reader = vtkXMLPolyDataReader()
+    reader.SetFileName(str(tmp_path / "a.vtp"))
+    reader.Update()
+    assert np.array_equal(vtk_to_numpy(reader.GetOutput().GetCellData().GetArray("uv")), uv)
+    assert np.array_equal(vtk_to_numpy(reader.GetOutput().GetCellData().GetArray("strand")), np.arange(50))
+    assert len(read_groom(tmp_path / "a.vtp")) == 50
+    if not all(importlib.util.find_spec(name) for name in ("pxr", "alembic3d")):
+        return
+    from alembic3d import Abc, AbcGeom
+    from pxr import Usd, UsdGeom
+
+    usd, abc = UsdWriter(tmp_path / "a.usdc", lines), AlembicWriter(tmp_path / "a.abc", lines, 1)
+    for writer in (usd, abc):
+        for frame in (1, 2):
+            writer.append(frame, chunks(50, 20, 4))
+        writer.close()
+    stage, archive = Usd.Stage.Open(str(tmp_path / "a.usdc")), Abc.IArchive(str(tmp_path / "a.abc"))
+    for number, begin in enumerate((0, 20, 40)):
+        name = f"strands_{number:03d}"
+        st = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath(f"/hair/{name}")).GetPrimvar("st")
+        assert np.array_equal(st.Get(), uv[begin : begin + 20])
+        assert st.GetInterpolation() == "uniform"
+        found = AbcGeom.ICurves(archive.getTop(), name).getSchema().getUVsParam().getExpandedValue()
+        assert np.array_equal(np.array(found.getVals()), uv[begin : begin + 20])
+        assert found.getScope() == AbcGeom.GeometryScope.kUniformScope
+
+
 @pytest.mark.parametrize("kind", ["usd", "abc"])
 def test_memory_does_not_grow_with_frames(tmp_path: Path, kind: str) -> None:
     """Memory in use after 4 and after 16 frames of 6 MB."""

@@ -298,7 +298,8 @@ HARM = {  # what a library may do instead of reading, and what the message must 
     "crashed (SIGABRT)": "import os; os.abort()",
     "takes more than": "x = bytearray(1 << 36)",
     "took more than 5 s": "import signal; signal.raise_signal(signal.SIGXCPU)",
-    "cannot be read (KeyError: (5, 6))": "import resource as r; {}[r.getrlimit(r.RLIMIT_CPU)]",
+    "cannot be read (KeyError: 5)": "import resource as r; {}[r.getrlimit(r.RLIMIT_CPU)[0]]",
+    "cannot be read (KeyError: 2147483648)": "import resource as r; {}[r.getrlimit(r.RLIMIT_AS)[0]]",
     "cannot be read (KeyError: 'x')": "{}['x']",
 }
 

@@ -15,6 +15,7 @@ from pipeline.config import load as load_config
 from pipeline.config.schema import Config
 from pipeline.config.sequence import numbered_files
 from pipeline.errors import InputError
+from pipeline.export.source import opened
 from pipeline.groom import stage as groom_stage
 from pipeline.interpolate import stage as interpolate_stage
 from pipeline.render import stage as render_stage
@@ -214,6 +215,8 @@ def test_every_strand_grows_from_the_skin_of_its_frame_and_is_drawn_there(tmp_pa
     assert np.abs(now[:, 0] - then).max() < 5e-4
     assert now[:, 1:].min() > -2e-4
     assert lengths == pytest.approx(0.117, abs=0.008)
+    with opened(config, experiment, "strands") as source:
+        assert np.array_equal(np.concatenate(list(source.moment(FRAMES))), strands)  # what is exported
     pytest.importorskip("vtk")
     render_stage.execute(config, experiment, "render", frames=(1, FRAMES))
     first, last = (np.asarray(Image.open(experiment.frames / f"{k:04d}.png")) for k in (1, FRAMES))

@@ -74,25 +74,38 @@ class AlembicWriter:
         if frame != self._next:
             raise ValueError(f"frame {frame}: expected {self._next}")
         self._next += 1
+        begin = 0
         for number, points in enumerate(chunks):
-            flat = np.ascontiguousarray(points.reshape(-1, 3), np.float32)
-            positions = imath.V3fArrayFromBuffer(flat)
+            positions = imath.V3fArrayFromBuffer(np.ascontiguousarray(points.reshape(-1, 3), np.float32))
             if number < len(self._objects):
                 self._objects[number].getSchema().set(AbcGeom.OCurvesSchemaSample(positions))
-                continue
-            made = AbcGeom.OCurves(self._archive.getTop(), f"strands_{number:03d}", self._times)
-            counts = np.full(len(points), self._lines.points, np.int32)
-            widths = np.tile(self._lines.widths, len(points)).astype(np.float32)
-            sample = AbcGeom.OCurvesSchemaSample(
-                positions,
-                imath.IntArrayFromBuffer(counts),
-                AbcGeom.CurveType.kLinear,
-                AbcGeom.CurvePeriodicity.kNonPeriodic,
-            )
-            scope = AbcGeom.GeometryScope.kVertexScope
-            sample.setWidths(AbcGeom.OFloatGeomParamSample(imath.FloatArrayFromBuffer(widths), scope))
-            made.getSchema().set(sample)
-            self._objects.append(made)
+            else:
+                made = AbcGeom.OCurves(self._archive.getTop(), f"strands_{number:03d}", self._times)
+                made.getSchema().set(self._first_sample(positions, begin, len(points)))
+                self._objects.append(made)
+            begin += len(points)
+
+    def _first_sample(self, positions: Any, begin: int, strands: int) -> Any:
+        """What only the first sample of an object says: topology, widths and UVs of roots."""
+        import imath
+        from alembic3d import AbcGeom
+
+        counts = np.full(strands, self._lines.points, np.int32)
+        widths = np.tile(self._lines.widths, strands).astype(np.float32)
+        sample = AbcGeom.OCurvesSchemaSample(
+            positions,
+            imath.IntArrayFromBuffer(counts),
+            AbcGeom.CurveType.kLinear,
+            AbcGeom.CurvePeriodicity.kNonPeriodic,
+        )
+        scope = AbcGeom.GeometryScope
+        sample.setWidths(
+            AbcGeom.OFloatGeomParamSample(imath.FloatArrayFromBuffer(widths), scope.kVertexScope)
+        )
+        if self._lines.uv is not None:
+            uv = imath.V2fArrayFromBuffer(np.ascontiguousarray(self._lines.uv[begin : begin + strands]))
+            sample.setUVs(AbcGeom.OV2fGeomParamSample(uv, scope.kUniformScope))
+        return sample
 
     def close(self) -> None:
         """Write what the library still holds."""

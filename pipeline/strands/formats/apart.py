@@ -55,10 +55,15 @@ class Limits:
         return cls(_MEMORY + _MEMORY_PER_BYTE * size, _SECONDS + int(size / _BYTES_PER_SECOND))
 
     def impose(self) -> None:
-        """Limit this process, for ever."""
-        resource.setrlimit(resource.RLIMIT_AS, (self.memory, self.memory))
-        resource.setrlimit(resource.RLIMIT_CPU, (self.seconds, self.seconds + 1))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        """Limit this process, for ever; a limit that is lower already stays."""
+        for what, limit in (
+            (resource.RLIMIT_AS, self.memory),
+            (resource.RLIMIT_CPU, self.seconds),
+            (resource.RLIMIT_CORE, 0),
+        ):
+            _, hard = resource.getrlimit(what)
+            least = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+            resource.setrlimit(what, (least, hard))
 
 
 def read_apart(path: Path) -> Ragged:
@@ -66,7 +71,7 @@ def read_apart(path: Path) -> Ragged:
     limits = Limits.of(path)
     root = str(Path(pipeline.__file__).parents[1])
     search = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
-    command = [sys.executable, "-m", "pipeline.strands.formats", str(path)]
+    command = [sys.executable, "-P", "-m", "pipeline.strands.formats", str(path)]
     try:
         child = subprocess.run(
             command,

@@ -23,3 +23,5 @@ class Lines:
     fps: float
     about: str
     """A few words on where the strands come from, kept in the file; ASCII, 87 letters at most."""
+    uv: NDArray[np.float32] | None = None
+    """(S, 2): where roots lie on the scalp, as image maps of grooms see it: 0 to 1 both ways."""

@@ -4,6 +4,7 @@
 UVs, thickness, colours (0 is absent). Positions are f32[4]: x, y, z and w, 0 for a held point.
 3.x, 296-byte header: f32 version; u32 guides; u32 points per strand; u32 followers per guide; i32 both ends held; at
 byte 144 u32 offset of positions, f32[3]. Roots are held (two points), tips too when the flag is set.
+Thicknesses are factors of the renderer's radius, without a unit: they are not read.
 """
 
 import struct

@@ -3,8 +3,9 @@
 A strand is a curve; strands are counted over the prims in the order of the stage. Read are all prims that are drawn:
 active, visible, of purpose "default" or "render", instances too, each where its transforms put it at the first time
 of the stage. `widths` are diameters in the space of their prim. The stage says its unit and its up axis; one that
-does not is in centimetres with y up, by definition. Written are metres with y up and Catmull and Rom's curves through the points, pinned; the time of a
-sample is the frame's number. Source: the documentation of UsdGeomBasisCurves and UsdGeomMetrics.
+does not is in centimetres with y up, by definition. Layers that it names are read too, but a change of those alone
+makes no groom stale. Written are metres with y up and Catmull and Rom's curves through the points, pinned; the time of
+a sample is the frame's number; primvars:st are the UVs of roots. Source: the documentation of UsdGeomBasisCurves and UsdGeomMetrics.
 """
 
 from pathlib import Path
@@ -79,16 +80,17 @@ class UsdWriter:
         """Append a moment; frames ascend. Raises InputError when the file cannot be written."""
         from pxr import Vt
 
-        unsaved = 0
+        unsaved = begin = 0
         for number, points in enumerate(chunks):
             if number == len(self._prims):
-                self._prims.append(self._define(number, len(points)))
+                self._prims.append(self._define(number, begin, len(points)))
             prim, margin = self._prims[number], self._lines.widths.max() / 2
             flat = np.ascontiguousarray(points.reshape(-1, 3), np.float32)
             extent = np.stack([flat.min(axis=0) - margin, flat.max(axis=0) + margin])
             prim.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy(flat), frame)
             prim.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(extent), frame)
             unsaved += flat.nbytes
+            begin += len(points)
             if unsaved > _UNSAVED:
                 self._save()
                 unsaved = 0
@@ -110,8 +112,8 @@ class UsdWriter:
         except Tf.ErrorException as error:
             raise InputError(f"{self._path}: OpenUSD cannot write it: {_reason(error)}") from None
 
-    def _define(self, number: int, strands: int) -> "UsdGeom.BasisCurves":
-        from pxr import UsdGeom, Vt
+    def _define(self, number: int, begin: int, strands: int) -> "UsdGeom.BasisCurves":
+        from pxr import Sdf, UsdGeom, Vt
 
         curves = UsdGeom.BasisCurves.Define(self._stage, f"/hair/strands_{number:03d}")
         curves.CreateTypeAttr("cubic")
@@ -122,6 +124,10 @@ class UsdWriter:
         curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.tile(self._lines.widths, strands)))
         curves.SetWidthsInterpolation("vertex")
         curves.CreatePointsAttr()
+        if self._lines.uv is not None:
+            kind = Sdf.ValueTypeNames.TexCoord2fArray
+            primvar = UsdGeom.PrimvarsAPI(curves.GetPrim()).CreatePrimvar("st", kind, "uniform")
+            primvar.Set(Vt.Vec2fArray.FromNumpy(self._lines.uv[begin : begin + strands]))
         return curves
 
 

@@ -6,9 +6,10 @@ each array, "_", then for each array its u64 number of bytes and the bytes. Sour
 documentation.
 """
 
+import struct
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,15 @@ from pipeline.strands.formats.ragged import Ragged, widened
 _WIDTHS = ("width", "widths")
 _TOGETHER = 1 << 16  # strands whose arrays are written at once
 _ARRAY = '<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="appended" offset="{}"/>'
+_BYTES = {"Float32": (4, "<f4"), "Int32": (4, "<i4"), "Int64": (8, "<i8")}
 _HEAD = """<?xml version="1.0"?>
 <!-- {about} -->
 <VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
 <PolyData><Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="{strands}" NumberOfStrips="0" NumberOfPolys="0">
 <Points>{0}</Points>
 <PointData>{1}</PointData>
-<CellData>{2}</CellData>
-<Lines>{3}{4}</Lines>
+<CellData>{2}{3}</CellData>
+<Lines>{4}{5}</Lines>
 </Piece></PolyData>
 <AppendedData encoding="raw">
 _"""
@@ -55,26 +57,32 @@ def read_vtk(path: Path) -> Ragged:
 
 
 def write_vtp(path: Path, lines: Lines, chunks: Chunks) -> None:
-    """Write one moment as a .vtp file, chunk by chunk: points, `width` of points, `strand` number of cells."""
+    """Write one moment as a .vtp file, chunk by chunk: points with `width`, lines with `strand` number and root's `uv`."""
     S, P = lines.strands, lines.points
-    layout = [  # type, name, components, bytes
-        ("Float32", "Points", 3, 12 * S * P),
-        ("Float32", "width", 1, 4 * S * P),
-        ("Int32", "strand", 1, 4 * S),
-        ("Int64", "connectivity", 1, 8 * S * P),
-        ("Int64", "offsets", 1, 8 * S),
+    uv = np.zeros((S, 0), np.float32) if lines.uv is None else lines.uv
+    starts = [(a, min(a + _TOGETHER, S)) for a in range(0, S, _TOGETHER)]
+    profile = np.tile(lines.widths, min(S, _TOGETHER))
+    arrays: list[
+        tuple[str, str, int, int, Iterable[NDArray[Any]]]
+    ] = [  # type, name, components, rows, pieces
+        ("Float32", "Points", 3, S * P, chunks),
+        ("Float32", "width", 1, S * P, (profile[: (b - a) * P] for a, b in starts)),
+        ("Int32", "strand", 1, S, (np.arange(a, b) for a, b in starts)),
+        ("Float32", "uv", uv.shape[1], S, [uv]),
+        ("Int64", "connectivity", 1, S * P, (np.arange(a * P, b * P) for a, b in starts)),
+        ("Int64", "offsets", 1, S, (np.arange(a + 1, b + 1) * P for a, b in starts)),
     ]
-    places = np.cumsum([0, *(8 + size for *_, size in layout)])
-    arrays = [_ARRAY.format(*array[:3], place) for array, place in zip(layout, places, strict=False)]
-    starts = range(0, S, _TOGETHER)
+    texts, place = [], 0
+    for kind, name, components, rows, _ in arrays:
+        texts.append(_ARRAY.format(kind, name, components, place) if components else "")
+        place += 8 + components * rows * _BYTES[kind][0]
     with path.open("wb") as file:
-        file.write(_HEAD.format(*arrays, about=lines.about, points=S * P, strands=S).encode())
-        _append(file, layout[0][3], (chunk.astype("<f4") for chunk in chunks))
-        profile = np.tile(lines.widths.astype("<f4"), min(S, _TOGETHER))
-        _append(file, layout[1][3], (profile[: (S - a) * P] for a in starts))
-        for kind, scale, (*_, size) in (("<i4", 1, layout[2]), ("<i8", P, layout[3])):
-            _append(file, size, (_numbers(a * scale, min(a + _TOGETHER, S) * scale, kind) for a in starts))
-        _append(file, layout[4][3], (_numbers(a + 1, min(a + _TOGETHER, S) + 1, "<i8") * P for a in starts))
+        file.write(_HEAD.format(*texts, about=lines.about, points=S * P, strands=S).encode())
+        for kind, _, components, rows, pieces in arrays:
+            size, number = _BYTES[kind]
+            file.write(struct.pack("<Q", components * rows * size))
+            for piece in pieces:
+                file.write(piece.astype(number).tobytes())
         file.write(_TAIL)
 
 
@@ -83,16 +91,6 @@ def write_series(path: Path, frames: Sequence[tuple[float, str]]) -> None:
     rows = "".join(f'<DataSet timestep="{time:.9g}" part="0" file="{file}"/>\n' for time, file in frames)
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
     path.write_text(f"{head}{rows}</Collection>\n</VTKFile>\n", encoding="utf-8")
-
-
-def _append(file: IO[bytes], size: int, pieces: Iterable[NDArray[Any]]) -> None:
-    file.write(np.uint64(size).astype("<u8").tobytes())
-    for piece in pieces:
-        file.write(piece.tobytes())
-
-
-def _numbers(a: int, b: int, kind: str) -> NDArray[Any]:
-    return np.arange(a, b, dtype=kind)
 
 
 def _read(path: Path) -> Any:
