@@ -222,6 +222,27 @@ class DistanceField:
 def distance(field: DistanceField, points: _F64) -> tuple[_F64, _F64]:
     """Signed distance (N,) [m] and unit outward normal (N, 3) at points (N, 3) float64 [m] of the head's rest frame."""
 
+def follow(
+    strands: _F64, guides: _F64, candidate: NDArray[np.int64], k: int, alike: float, unlike: float
+) -> tuple[NDArray[np.uint32], _F32]:
+    """Which of its candidates each strand follows, and how much (follow.hpp).
+
+    Args:
+        strands: features (N, D), the root first, in units in which differences of root and shape count the same.
+        guides: features (G, D).
+        candidate: (N, C) rows of the guides, nearest first; negative for none.
+        k: guides of a strand.
+        alike: difference of shape from its best guide to which another one counts in full.
+        unlike: difference from which on it does not count.
+
+    Returns:
+        guide (N, k) uint32 and weight (N, k) float32, greatest first, of sum 1; all 0 for a strand without candidates.
+
+    Raises:
+        ValueError: shapes that do not fit, a candidate beyond the guides, more than 64 candidates.
+
+    """
+
 class PartingLines:
     """Partings as segments of the scalp's chart, and whether ways between roots cross them (partings.hpp)."""
 

@@ -34,6 +34,7 @@ void bind_shade(nb::module_ &m);
 void bind_expand(nb::module_ &m);
 void bind_groom(nb::module_ &m);
 void bind_parts(nb::module_ &m);
+void bind_follow(nb::module_ &m);
 void bind_partings(nb::module_ &m);
 void bind_groom(nb::module_ &m);
 void bind_parts(nb::module_ &m);
@@ -59,6 +60,7 @@ NB_MODULE(RINGLET_MODULE, m) {
     ringlet::bind_groom(m);
     ringlet::bind_parts(m);
     ringlet::bind_mesh(m);
+    ringlet::bind_follow(m);
     ringlet::bind_partings(m);
     ringlet::bind_peak(m);
     ringlet::bind_raster(m);

@@ -98,7 +98,7 @@ class Neighbours:
         return found
 
     def _nearest(self, points: Points, count: int) -> Indices:
-        _, found = self.tree.query(points, count)
+        _, found = self.tree.query(points, count, workers=kernels.threads())
         return np.asarray(found, np.int64).reshape(len(points), count)
 
 

@@ -15,7 +15,7 @@ from pipeline.config.schema import Config, Interpolate
 from pipeline.interpolate import bind as bind_module
 from pipeline.interpolate import stage
 from pipeline.interpolate.copies import Roots
-from pipeline.interpolate.follow import GuideSet, follow, shape_of
+from pipeline.strands.follow import GuideSet, follow, shape_of
 from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding
 from pipeline.strands.partings import Neighbours, Partings

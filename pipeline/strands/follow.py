@@ -1,20 +1,24 @@
 """Which guides a strand follows: few, near, of similar shape, and none that a parting lies before.
 
-Notation: d distance of the roots, D differences of the shapes; a guide's cost is c^2 = (d / 10 mm)^2 + sum (D / 30 mm)^2,
-its weight a Gaussian of c. On a groom of 11,400 strands similarity saves a third of the error, or half of the guides.
+Notation: d distance of the roots, D differences of the shapes; a guide's distance from a strand is c with
+c^2 = (d / 10 mm)^2 + sum (D / 30 mm)^2, its weight that of kriging over such distances (kernels/follow.hpp). On a groom
+of 11,400 strands similarity saves a third of the error, or half of the guides.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.strands.partings import NOBODY, Neighbours
+from pipeline import kernels
+from pipeline.strands.partings import Neighbours
 
 Floats = NDArray[np.float64]
 
 CANDIDATES = 12  # nearest roots of which the most similar are taken
 _ROOT_SCALE, _SHAPE_SCALE = 0.010, 0.030  # [m]
+_ALIKE, _UNLIKE = 3.0, 6.0  # shape scales: guides that differ more from the best one do not move the strand
 _LEVELS = 3  # points along the strand at which shapes are compared
 
 
@@ -40,6 +44,11 @@ class GuideSet:
     strand: NDArray[np.uint32]
     """(G,): the groom strand that the guide is, ascending."""
 
+    @cached_property
+    def features(self) -> Floats:
+        """(G, 12): what the cost compares."""
+        return _features(self.roots.points, self.shape)
+
 
 def follow(
     root: Floats, shape: Floats, guides: GuideSet, k: int
@@ -60,7 +69,8 @@ def follow(
 
     """
     candidate = guides.roots.near(root, CANDIDATES, enough=k + 1)
-    return _best(root, shape, candidate, guides, k)
+    strands = _features(root, shape)
+    return kernels.follow(strands, guides.features, candidate, k, _ALIKE, _UNLIKE)
 
 
 def follow_itself(
@@ -73,32 +83,5 @@ def follow_itself(
     weight[own, 0] = 1
 
 
-def _best(
-    root: Floats, shape: Floats, candidate: NDArray[np.intp], guides: GuideSet, k: int
-) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
-    there = candidate != NOBODY
-    apart = (guides.roots.points[candidate] - root[:, None]) / _ROOT_SCALE
-    unlike = guides.shape[candidate] - shape[:, None]
-    cost = np.where(there, (apart**2).sum(axis=2) + (unlike**2).sum(axis=2), np.inf)
-    order = np.argsort(cost, axis=1, kind="stable")
-    cost = np.take_along_axis(cost, order, axis=1)
-    guide = np.take_along_axis(candidate, order, axis=1)
-    taken = min(k, guide.shape[1])
-    weight = _weights(cost, taken)
-    guide = np.where(guide == NOBODY, guide[:, :1], guide)[:, :taken].clip(min=0)
-    missing = ((0, 0), (0, k - taken))
-    return np.pad(guide, missing, mode="edge").astype(np.uint32), np.pad(weight, missing).astype(np.float32)
-
-
-def _weights(cost: Floats, k: int) -> Floats:
-    """Gaussian as wide as the mean of the k costs, which falls to 0 where the next guide would take the place.
-
-    Without that fall neighbouring strands would part visibly where their k-th guides change. Infinite costs weigh 0.
-    """
-    best, there = cost[:, :k], np.isfinite(cost)
-    count = np.maximum(there[:, :k].sum(axis=1, keepdims=True), 1)
-    known = np.where(there[:, :k], best, 0)
-    weight = np.where(there[:, :k], np.exp(-known / (known.sum(axis=1, keepdims=True) / count + 1e-12)), 0)
-    if cost.shape[1] > k:
-        weight *= 1.001 - known / (cost[:, k : k + 1] + 1e-12)
-    return np.asarray(weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300))
+def _features(root: Floats, shape: Floats) -> Floats:
+    return np.concatenate([root / _ROOT_SCALE, shape], axis=1)
