@@ -10,9 +10,9 @@ from pipeline import kernels
 from pipeline.config.schema import Interpolate
 from pipeline.interpolate.bind import Groom, bind
 from pipeline.interpolate.copies import Roots
-from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding, Expansion, Style
+from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.strands.partings import Neighbours, Partings
 from pipeline.strands.random import uniform
 

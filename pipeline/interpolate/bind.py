@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from pipeline.config.schema import Interpolate
 from pipeline.interpolate.copies import Roots, looks
-from pipeline.strands.follow import GuideSet, follow, follow_itself, shape_of
 from pipeline.strands.expand import Binding
+from pipeline.strands.follow import GuideSet, follow, follow_itself, shape_of
 
 CHUNK = 16_384
 

@@ -15,9 +15,9 @@ from pipeline.cache.partings import read_partings
 from pipeline.config import Config, provenance
 from pipeline.interpolate.bind import CHUNK, Groom, bind
 from pipeline.interpolate.copies import Roots
-from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.progress import say
 from pipeline.strands.expand import Binding
+from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.strands.partings import Neighbours
 
 

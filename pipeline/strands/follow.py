@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 CANDIDATES = 12  # nearest roots of which the most similar are taken
 _ROOT_SCALE, _SHAPE_SCALE = 0.010, 0.030  # [m]
-_ALIKE, _UNLIKE = 3.0, 6.0  # shape scales: guides that differ more from the best one do not move the strand
+_ALIKE, _UNLIKE = 2.0, 4.0  # shape scales: guides that differ more from the best one do not move the strand
 _LEVELS = 3  # points along the strand at which shapes are compared
 
 

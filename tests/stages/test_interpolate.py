@@ -15,9 +15,9 @@ from pipeline.config.schema import Config, Interpolate
 from pipeline.interpolate import bind as bind_module
 from pipeline.interpolate import stage
 from pipeline.interpolate.copies import Roots
-from pipeline.strands.follow import GuideSet, follow, shape_of
 from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding
+from pipeline.strands.follow import GuideSet, follow, shape_of
 from pipeline.strands.partings import Neighbours, Partings
 
 STRANDS, POINTS, GUIDES = 900, 32, 80

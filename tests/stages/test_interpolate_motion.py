@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from pipeline.config.schema import Hair, Interpolate, Simulate
 from pipeline.interpolate.bind import Groom, bind
 from pipeline.interpolate.copies import Roots
-from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.simulate.stepper import Guides, Simulation
 from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding, Expansion
+from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.strands.held import held_ends
 from pipeline.strands.partings import Neighbours, Partings
 from tests.conftest import helix

@@ -23,9 +23,9 @@ from scipy.spatial.transform import Rotation
 from pipeline.config.schema import Interpolate
 from pipeline.interpolate.bind import Groom, bind
 from pipeline.interpolate.copies import Roots
-from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.strands.chart import Chart
 from pipeline.strands.expand import Binding, Expansion
+from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.strands.partings import Neighbours, Partings
 from pipeline.validation.interpolation.scene import Index, Scene
 
