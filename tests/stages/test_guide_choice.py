@@ -72,7 +72,7 @@ def test_a_target_error_is_reached_by_about_the_fewest_guides(wavy: Strands) -> 
 
 
 def test_a_strand_between_equal_guides_is_rebuilt_as_they_are(straight: NDArray[np.float64]) -> None:
-    points = np.stack([straight + [0, 0, z] for z in (0.0, 0.004, 0.01)]).astype(np.float32)
+    points = np.stack([straight + np.array([0, 0, z]) for z in (0.0, 0.004, 0.01)]).astype(np.float32)
     points[1] = points[1, 0] + 0.5 * (points[1] - points[1, 0])  # shorter, and of the same shape
     error = rebuild_error(points, np.array([0, 2], np.uint32), UNPARTED)
     print(f"errors {error}")
