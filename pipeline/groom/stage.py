@@ -48,17 +48,19 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
             _write_body(writer, body_frames(config, head))
         write_partings(writer, source.partings)
         points, roots = _write_strands(writer, source, looked_at(config.groom.guides))
-        chosen = choose_guides(points, config.groom.guides)
-        more = shut_in(chosen, roots, source.partings)
-        chosen = np.sort(np.concatenate([chosen, more]))
+        choice = choose_guides(points, config.groom.guides, source.partings, config.groom.guide_error)
+        more = shut_in(choice.strand, roots, source.partings)
+        chosen = np.sort(np.concatenate([choice.strand, more]))
         writer.write("guides/strand", chosen)
         offset = contact_offset(
             config.simulate.contact, head.field if head else None, _guide_points(source, points, chosen)
         )
         writer.write("guides/offset", offset)
-        writer.meta["report"] = {"strands": source.count, "guides": len(chosen)} | source.report
+        writer.meta["report"] = (
+            {"strands": source.count, "guides": len(chosen)} | choice.report | source.report
+        )
     added = f", {len(more)} of them for hair that partings shut off from all others" if len(more) else ""
-    say("groom", f"{source.count} strands, {len(chosen)} guides{added}")
+    say("groom", f"{source.count} strands, {len(chosen)} guides{added}; {choice}")
 
 
 def contact_offset(contact: Contact, field: Field | None, guides: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -17,7 +17,7 @@ choose(Rows strands, Rows guides, Array<const int64_t, -1, -1> candidate, int k,
     const size_t N = strands.shape(0), D = strands.shape(1), C = candidate.shape(1), G = guides.shape(0);
     require(D >= 3 && guides.shape(1) == D, "follow: strands and guides have different features");
     require(candidate.shape(0) == N && C <= kCandidatesMax, "follow: expected a row of at most 64 candidates for each strand");
-    require(k >= 1 && k <= kGuidesTaken, "follow: expected 1 to 8 guides for each strand");
+    require(k >= 1 && k <= kFollowedMax, "follow: expected 1 to 8 guides for each strand");
     require(alike >= 0 && unlike > alike, "follow: expected 0 <= alike < unlike");
     for (size_t i = 0; i < N * C; ++i)
         require(candidate.data()[i] < int64_t(G), "follow: a candidate beyond the last guide");

@@ -35,7 +35,9 @@ class Groom(Section):
     strands: Annotated[int, Field(ge=1, le=10_000_000)] = 60_000
     """Number of strands; of a file, the first so many of its strands in progressive order."""
     guides: Annotated[int, Field(ge=1, le=100_000)] = 1_000
-    """Number of strands that are simulated."""
+    """Number of strands that are simulated; with `guide_error`, the most."""
+    guide_error: Annotated[float, Field(gt=0, lt=1)] | None = None
+    """Mean error, as a fraction of the length, of strands rebuilt at rest from their guides: as few guides are chosen as reach it. Unset, there are `guides` of them."""
     points: Annotated[int, Field(ge=8, le=256)] = 32
     """Points on every strand and guide, at equal spacing."""
     partings: dict[PartingName, Parting] = Field(default={}, max_length=100)

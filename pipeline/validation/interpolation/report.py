@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.groom.guides import choose_guides
+from pipeline.strands.chart import Chart
+from pipeline.strands.partings import Partings
 from pipeline.strands.random import uniform
 from pipeline.validation.interpolation.forces import internal_forces
 from pipeline.validation.interpolation.grooms import KINDS, Kind
@@ -120,7 +122,7 @@ def merged(plan: Plan, parts: list[Report]) -> Report:
 def chosen(hair: Scene, choice: str, count: int) -> Index:
     """Guides (G,), ascending: production's choice, or any strands."""
     if choice == "ours":
-        return choose_guides(hair.points, count).astype(np.int64)
+        return choose_guides(hair.points, count, Partings(Chart.from_above())).strand.astype(np.int64)
     return np.sort(np.argsort(uniform(1, np.arange(len(hair)), 0x1F10))[:count])
 
 
