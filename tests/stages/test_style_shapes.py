@@ -1,14 +1,22 @@
 """Operators that give hair another shape: bend, gather and fringe keep their laws on the mannequin."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline import cache
+from pipeline.cache.expansion import expansion_from
 from pipeline.config.schema import Bend, Config, Fringe, Gather, Groom, Lengths
+from pipeline.groom import stage as groom_stage
+from pipeline.groom.head_field import Field
 from pipeline.groom.heads import Head
 from pipeline.groom.procedural import Style
 from pipeline.groom.style.fringe import in_fringe
 from pipeline.groom.style.gather import Ring
+from pipeline.interpolate import stage as interpolate_stage
+from pipeline.simulate import stage as simulate_stage
 from pipeline.strands.spacing import arc_length
 from pipeline.strands.strands import Strands
 from tests.stages.conftest import shipped
@@ -142,3 +150,41 @@ def test_a_bend_turns_tips_and_keeps_lengths(measured_from: str) -> None:
     assert np.abs(turned[middle < begin]).max() < 1e-12
     assert after < 1e-12
     assert stretch < 1e-12
+
+
+def test_a_turn_of_the_head_leaves_every_strand_in_its_ring(tmp_path: Path) -> None:
+    """Simulated guides and the strands that follow them, a quarter of a second into the shipped motion."""
+    config = shipped("ponytail", strands=400, guides=40)
+    config = config.model_copy(update={"simulate": config.simulate.model_copy(update={"frames": 7})})
+    experiment = cache.Experiment(tmp_path)
+    for stage, name in (
+        (groom_stage, "groom"),
+        (simulate_stage, "simulate"),
+        (interpolate_stage, "interpolate"),
+    ):
+        stage.execute(config, experiment, name)
+    with cache.open(experiment.groom, "groom") as groom, cache.open(experiment.strands, "strands") as strands:
+        expansion, tied = expansion_from(groom, strands, config), groom["strands/held"][:][:, 2:].any(axis=1)
+        spacing = float(groom["head/spacing"][0])
+        skin = Field(groom["head/distance"][:], np.asarray(groom["head/origin"][:], np.float64), spacing)
+    tail = config.groom.style["tail"]
+    assert isinstance(tail, Gather)
+    ring = Ring.on(skin, tail)
+    far, tips = [], []
+    with cache.open_guides(experiment.guides) as guides:
+        for frame in (0, 6):
+            pose = guides.pose(frame)
+            expansion.frame(guides.frame(frame), pose)
+            points = expansion.chunk(0, len(tied)).astype(np.float64)[tied]
+            own = (points - pose[:3, 3]) @ pose[:3, :3]
+            far.append(crossing(own, ring))
+            tips.append(own[:, -1])
+    swung = np.linalg.norm(tips[1] - tips[0], axis=1).mean()
+    moved = np.abs(far[1] - far[0]).max()
+    print(
+        f"tips swing by {100 * swung:.1f} cm against the head, strands within their ring by {1000 * moved:.2f} mm; "
+        f"half of them pass {1000 * np.median(far[1]):.1f} mm from its middle, 99 % within {1000 * np.quantile(far[1], 0.99):.1f} mm"
+    )
+    assert swung > 0.01
+    assert moved < 2e-3  # by the blend of 40 guides
+    assert np.quantile(far[1], 0.99) < tail.radius

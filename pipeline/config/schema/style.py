@@ -230,6 +230,8 @@ class Fringe(Operator):
     """No strand of the region reaches below this height (y)."""
     uneven: Annotated[Length, Field(ge=0)] = 0.003
     """How much higher single strands end."""
+    fan: float = 0.5
+    """How much strands spread to both sides, the more the farther out their roots are; 0 is straight ahead."""
     sideways: float = 0.0
     """Sideways part of their direction; positive is to the head's left."""
     lift: Annotated[Length, Field(ge=0)] = 0.008

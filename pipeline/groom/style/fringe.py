@@ -9,7 +9,7 @@ from pipeline import kernels
 from pipeline.config.schema import Fringe
 from pipeline.groom.combing import Combing
 from pipeline.groom.style.chance import Chance
-from pipeline.groom.style.ground import Ground, Terrain, tangential
+from pipeline.groom.style.ground import Ground, Terrain
 from pipeline.groom.style.growth import Sprouts, grown, stretches
 from pipeline.groom.style.hair import STEP, Hair, Vectors, cut_to, set_apart, unit
 
@@ -29,11 +29,10 @@ def fringed(hair: Hair, op: Fringe, ground: Ground, chance: Chance) -> Hair:
     which = np.flatnonzero(in_fringe(hair.root, op))
     if not len(which):
         return hair
-    terrain = ground.under(op.op)
     index, root, normal = hair.index[which], hair.root[which], hair.normal[which]
-    towards = np.array([op.sideways, 0.0, 1.0])
+    terrain = _forehead(ground.under(op.op), op)
     steps = round(_LONGEST / STEP)
-    ahead = unit(tangential(np.broadcast_to(towards, root.shape), normal))
+    ahead = terrain.combing.flow(root, normal, np.zeros((len(which), 2)))
     own = Sprouts(
         root=root,
         standoff=np.zeros((len(which), 2)),
@@ -47,7 +46,7 @@ def fringed(hair: Hair, op: Fringe, ground: Ground, chance: Chance) -> Hair:
         length=np.full(len(which), _LONGEST),
         wander=np.zeros((len(which), stretches(steps), 3)),
     )
-    path = grown(own, _forehead(terrain, towards), op.depth, steps)
+    path = grown(own, terrain, op.depth, steps)
     higher = op.uneven * chance.uniform(index, _UNEVEN) + _ABOVE
     plane = np.array([0.0, -1.0, 0.0, op.height])
     cut = np.maximum(kernels.first_outside(path, -higher, plane, False, -np.inf), _SHORTEST)
@@ -63,7 +62,10 @@ def in_fringe(root: Vectors, op: Fringe) -> NDArray[np.bool_]:
     return np.asarray(np.abs(root[:, 0]) < 0.5 * op.width * (1 - behind / op.depth))
 
 
-def _forehead(terrain: Terrain, towards: Vectors) -> Terrain:
-    """The skin without the guard in front of the face, combed in one direction (3,)."""
-    grid = np.tile([*towards, 1.0], (2, 2, 1)).astype(np.float32)
-    return Terrain(terrain.skin, terrain.skin, Combing(terrain.combing.chart, grid, np.zeros((0, 2, 2))))
+def _forehead(terrain: Terrain, op: Fringe) -> Terrain:
+    """The skin without the guard in front of the face, combed forwards; to both sides the more, the farther out."""
+    chart = terrain.combing.chart
+    u = np.array([-1.0, 1.0]) * chart.axes[0, 0]
+    sideways = np.broadcast_to(op.sideways + op.fan * u[:, None], (2, 2))
+    grid = np.stack([sideways, 0 * sideways, 0 * sideways + 1, 0 * sideways + 1], axis=2).astype(np.float32)
+    return Terrain(terrain.skin, terrain.skin, Combing(chart, grid, np.zeros((0, 2, 2))))
