@@ -80,7 +80,7 @@ sheet: render ## the frames of CONFIG on one page
 
 # --- Checks --------------------------------------------------------------------------------------
 
-.PHONY: test lint validate interpolation images approve bench sanitize schema
+.PHONY: test lint validate interpolation gallery images approve bench sanitize schema
 test: env ## all tests
 	$(BIN)/pytest -n 2 --dist loadfile
 
@@ -95,6 +95,9 @@ validate: env ## the physics against closed forms and rod equations; writes docs
 
 interpolation: env ## strands that follow guides against their own simulation; writes docs/interpolation.md
 	$(RINGLET) bench interpolation-error --page docs/interpolation.md
+
+gallery: env ## every style, rendered; writes docs/gallery.md
+	$(BIN)/python docs/gallery.py
 
 images: env ## golden images; differences go to an HTML page
 	$(BIN)/pytest tests/images
