@@ -112,14 +112,19 @@ class Skin {
             if (!any<float>(near)) break;
             t = select(near, tilted(t, whole, gradient, depth), t);
             near &= depth > kCurved;
+            if (round == kCareful - 1 && any<float>(near)) {
+                sample<float>(field_, x, phi, gradient);
+                t = select(near, (whole / (length(gradient) + 1e-12f)) * gradient, t);
+            }
         }
         return t;
     }
 
   private:
     static constexpr float kRise = 0.25f;
-    static constexpr int kRounds = 4;          // one is exact over a plane
-    static constexpr float kCurved = 0.5e-3f;  // [m]: from less depth one is exact to 0.01 mm over any head
+    static constexpr int kCareful = 4;         // rounds; one is exact over a plane. In folds of the skin, as behind an
+    static constexpr int kRounds = 8;          // ear, what is nearest changes with each: who is not out then stands up
+    static constexpr float kCurved = 0.1e-3f;  // [m]: from less depth one is exact over any head
 
     /// The segment whose end is higher by `rise`, turned in the plane of itself and the normal; upright at most.
     static RINGLET_INLINE Vec3<float> tilted(Vec3<float> t, Lanes<float> whole, Vec3<float> gradient, Lanes<float> rise) {

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from pipeline import kernels
+from pipeline.bench.interpolate import swung
 from pipeline.config.schema import Hair, Simulate
 from pipeline.groom.heads import Head
 from pipeline.simulate.rest import rest_shape, step_settings
+from pipeline.strands.expand import Binding, Expansion
+from pipeline.strands.strands import Strands
 
 POINTS = 12
 
@@ -42,3 +46,46 @@ def test_no_strand_flies_through_an_ear(mannequin: Head, dt: float) -> None:
         )
         assert lowest > -0.2e-3  # the ear is up to 9 mm thick there: what goes through comes 4.4 mm deep
         assert points[..., 2].mean(axis=1).min() < -0.02  # at least the innermost is stopped behind it
+
+
+@pytest.mark.parametrize("angle", [0.6, -0.6])
+def test_no_strand_that_follows_guides_comes_into_ears_or_shoulders(
+    mannequin: Head, wavy: Strands, angle: float
+) -> None:
+    """Guides swing sideways through ear and shoulder; the strands that follow them stay out and keep their lengths."""
+    rest, guides = wavy.points, wavy.points[::25]
+    count = len(rest)
+    near = np.asarray(cKDTree(guides[:, 0]).query(rest[:, 0], 3)[1], np.uint32)
+    binding = Binding(
+        parent=np.arange(count, dtype=np.uint32),
+        root=np.ascontiguousarray(rest[:, 0]),
+        guide=near,
+        weight=np.full(near.shape, 1 / 3, np.float32),
+        key=np.zeros(count, np.uint32),
+        scale=np.ones(count, np.float32),
+        phase=np.zeros(count, np.float32),
+    )
+    field = kernels.DistanceField(mannequin.field.values, mannequin.field.origin, mannequin.field.spacing)
+    depth = {}
+    for name, head in (("free", None), ("kept out", field)):
+        expansion = Expansion(rest, guides, binding, head)
+        expansion.frame(swung(guides, angle), np.eye(4))
+        points = expansion.chunk(0, count).astype(np.float64)
+        phi = mannequin.field.distance(points[:, 1:].reshape(-1, 3))
+        place = points[:, 1:].reshape(-1, 3)
+        ear = (np.abs(place[:, 0]) > 0.07) & (np.abs(place[:, 1] + 0.01) < 0.04)
+        regions = {"ears": ear, "shoulders": place[:, 1] < -0.14, "anywhere": np.ones(len(place), bool)}
+        depth[name] = {region: -1e3 * float(phi[inside].min()) for region, inside in regions.items()}
+    lengths = [
+        np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1) for x in (rest.astype(np.float64), points)
+    ]
+    stretched = np.abs(lengths[1] / lengths[0] - 1).max()
+    print(
+        "; ".join(
+            f"{name}: " + ", ".join(f"{r} {d:.2f} mm" for r, d in of.items()) for name, of in depth.items()
+        )
+    )
+    print(f"lengths are off by {stretched:.1e}")
+    assert min(depth["free"].values()) > 3
+    assert max(depth["kept out"].values()) < 0.1
+    assert stretched < 1e-5
