@@ -14,12 +14,14 @@ from pipeline.groom.heads import Head
 from pipeline.strands.chart import Chart
 from pipeline.strands.formats.table import read_table
 from pipeline.strands.partings import Partings
+from pipeline.strands.spacing import arc_length
 
 Points = NDArray[np.floating[Any]]
 Vectors = NDArray[np.float64]
 
 _FRONT, _BACK = 0.10, -0.045  # [m] ends of the line from the hairline to the crown, in z
 _FADE_FROM, _FADE_OVER = -0.08, 0.09  # [m] off the middle it bends back to it towards the crown
+_BEYOND = 0.02  # [m] that it goes on after the hairline
 _CORNERS = 60
 _CHORD = 2e-3  # [m] longest piece of a line between corners that is taken for straight in the chart
 _FAR = 0.05  # [m] corners this far from the skin were meant for something else
@@ -103,4 +105,9 @@ def _front_to_crown(offset: float, head: Head) -> Vectors:
     skin = head.fitted_field
     for _ in range(30):  # lower it onto the skin
         line[:, 1] -= skin.distance(line)
-    return line
+    # Far to the side there is no skin below its front: it would fall down the face. It ends beyond the hairline.
+    hairy = np.flatnonzero(head.density(line) > 0)
+    if not len(hairy):
+        return line
+    along = arc_length(line[None])[0]
+    return np.asarray(line[along < along[hairy[-1]] + _BEYOND])

@@ -212,3 +212,17 @@ def test_strands_without_a_head_are_parted_as_seen_from_above(tmp_path: Path) ->
     print(f"{left:.2f} of the strands to the left of the parting, {across.sum()} guides across it")
     assert 0.3 < left < 0.45
     assert not across.any()
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.02, 0.032, 0.045])
+def test_an_offset_line_ends_beyond_the_hairline(mannequin: Head, offset: float) -> None:
+    """Lowered onto the skin, its front end must not slide down the face: hair would flow up from there."""
+    partings = partings_of(Config(name="p", groom={"partings": {"main": {"offset": offset}}}), mannequin)
+    line = mannequin.on_skin(partings.lines[0])
+    bald = mannequin.density(line) == 0
+    print(
+        f"offset {1000 * offset:.0f} mm: front end at {line[-1].round(3)}, {bald.sum()} corners without hair"
+    )
+    assert bald[-1]
+    assert not bald[: -bald.sum()].any()
+    assert line[:, 1].min() > 0.06
