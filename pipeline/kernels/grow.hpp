@@ -85,8 +85,9 @@ class Grower {
     /// `kStretch` steps.
     void grow(Vec3<float> *x, int K, Vec3<float> t, const Vec3<float> *noise) const {
         Lanes<float> fade = decay_;
+        Place here{{}, {}, ~Mask<float>{}};
         for (int k = 1; k < K; ++k, fade *= decay_) {
-            if (k <= longest_) t = turned(x[k - 1], t, k * step_, fade, noise[(k - 1) / kStretch]);
+            if (k <= longest_) t = turned(x[k - 1], here, t, k * step_, fade, noise[(k - 1) / kStretch]);
             x[k] = x[k - 1] + splat(step_) * t;
         }
     }
@@ -104,13 +105,25 @@ class Grower {
 
     static RINGLET_INLINE Vec3<float> tangential(Vec3<float> v, Vec3<float> m) { return v - dot(v, m) * m; }
 
-    /// The direction of the step from x that follows direction t.
-    Vec3<float> turned(Vec3<float> x, Vec3<float> t, float s, Lanes<float> fade, Vec3<float> noise) const {
+    /// What is known of the wall at a point: lanes that are `unknown` are still to be looked up.
+    struct Place {
+        Lanes<float> d;
+        Vec3<float> m;
+        Mask<float> unknown;
+    };
+
+    /// The direction of the step from x that follows direction t; `here` becomes the place where it ends.
+    Vec3<float> turned(Vec3<float> x, Place &here, Vec3<float> t, float s, Lanes<float> fade, Vec3<float> noise) const {
         const Lanes<float> none{};
         const Growth &g = growth_;
-        Lanes<float> d, ahead;
-        Vec3<float> m, n;
-        wall(x, d, m);
+        if (any<float>(here.unknown)) {
+            Lanes<float> d;
+            Vec3<float> m;
+            wall(x, d, m);
+            here.d = here.unknown ? d : here.d, here.m = select(here.unknown, m, here.m);
+        }
+        const Lanes<float> d = here.d;
+        const Vec3<float> m = here.m;
         const Lanes<float> sunk = smoothstep<float>((kJaw - x.y) * (1 / kSink));
         const Lanes<float> layer = kClearance + g.height * smoothstep<float>(s * rise_) * (1 - 0.9f * sunk);
         const Vec3<float> combed = direction(tangential(terrain_.flow_at(x, g.standoff), m));
@@ -124,10 +137,11 @@ class Grower {
         target = direction(target + (pull - dive) * m);
         t = direction(t + turn_ * (target - t));
         // Lift what would end too low
-        wall(x + splat(step_) * t, ahead, n);
+        wall(x + splat(step_) * t, here.d, here.m);
         const Lanes<float> lowest = minimum<float>(layer, splat(kClearance + 0.25f * s));
-        const Lanes<float> lift = 0.6f * maximum<float>(lowest - ahead, none);
-        return direction(splat(step_) * t + lift * n);
+        const Lanes<float> lift = 0.6f * maximum<float>(lowest - here.d, none);
+        here.unknown = lift > 0;
+        return select(here.unknown, direction(splat(step_) * t + lift * here.m), t);
     }
 
     const Terrain &terrain_;

@@ -153,9 +153,9 @@ def test_a_bend_turns_tips_and_keeps_lengths(measured_from: str) -> None:
 
 
 def test_a_turn_of_the_head_leaves_every_strand_in_its_ring(tmp_path: Path) -> None:
-    """Simulated guides and the strands that follow them, a quarter of a second into the shipped motion."""
+    """Simulated guides and the strands that follow them, 0.4 s into the shipped motion."""
     config = shipped("ponytail", strands=400, guides=40)
-    config = config.model_copy(update={"simulate": config.simulate.model_copy(update={"frames": 7})})
+    config = config.model_copy(update={"simulate": config.simulate.model_copy(update={"frames": 11})})
     experiment = cache.Experiment(tmp_path)
     for stage, name in (
         (groom_stage, "groom"),
@@ -172,7 +172,7 @@ def test_a_turn_of_the_head_leaves_every_strand_in_its_ring(tmp_path: Path) -> N
     ring = Ring.on(skin, tail)
     far, tips = [], []
     with cache.open_guides(experiment.guides) as guides:
-        for frame in (0, 6):
+        for frame in (0, 10):
             pose = guides.pose(frame)
             expansion.frame(guides.frame(frame), pose)
             points = expansion.chunk(0, len(tied)).astype(np.float64)[tied]
