@@ -28,7 +28,7 @@ Points = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
 
 CHUNK = 65_536  # strands that are in flight at once
-_KEPT = 400 << 20  # [bytes] points that are kept from the first pass for the second
+_KEPT = 100 << 20  # [bytes] points that are kept from the first pass for the second; more are expanded twice
 _MARGIN = 0.02  # [m] that strands may leave the bounds of their guides
 _MELANIN = 31  # salt
 
@@ -72,7 +72,8 @@ class FrameRenderer:
         self.render, self.camera = render, scene.camera
         self.strands, self.key, self.skin = strands, key, skin
         self.eye = np.array(scene.camera.position, np.float64)
-        self.width = drawn_width(render, strands.count)
+        self.count = min(render.strands or strands.count, strands.count)
+        self.width = drawn_width(render, self.count, strands.count)
         spread = np.clip(normal(config.seed, key, _MELANIN), -2, 2)
         jitter = render.hair.melanin_jitter * spread
         self.melanin = np.clip(render.hair.melanin + jitter, 0, 0.99).astype(np.float32)
@@ -121,7 +122,7 @@ class FrameRenderer:
         coverage: Coverage | None,
     ) -> list[tuple[int, Points]]:
         """First pass: all strands into the density grid; returns their points where they are few enough to keep."""
-        keep = self.strands.count * self.strands.points * 12 <= _KEPT
+        keep = self.count * self.strands.points * 12 <= _KEPT
         kept: list[tuple[int, Points]] = []
         self.lighting.begin(lower, upper, self.width)
         for first, points in self._chunks(reuse=not keep):
@@ -142,8 +143,8 @@ class FrameRenderer:
 
     def _chunks(self, reuse: bool = True) -> Iterator[tuple[int, Points]]:
         buffer: Points | None = None
-        for first in range(0, self.strands.count, CHUNK):
-            last = min(first + CHUNK, self.strands.count)
+        for first in range(0, self.count, CHUNK):
+            last = min(first + CHUNK, self.count)
             if buffer is None or not reuse or len(buffer) != last - first:
                 buffer = np.empty((last - first, self.strands.points, 3), np.float32)
             yield first, self.strands.chunk(first, last, buffer)

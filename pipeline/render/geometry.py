@@ -16,11 +16,17 @@ _FIBRE = 80e-6  # [m] a human hair's diameter
 _FULL = 100_000  # strands of a full head
 
 
-def drawn_width(render: Render, strands: int) -> float:
-    """Width [m] of a strand in the picture: the config's, or a fibre's, widened when there are few strands."""
-    if render.width is not None:
-        return render.width
-    return float(_FIBRE * np.sqrt(max(_FULL / strands, 1.0)))
+def drawn_width(render: Render, strands: int, of: int | None = None) -> float:
+    """Width [m] of a strand in the picture: the config's, or a fibre's, widened when there are few strands.
+
+    Where only the first `strands` of `of` strands are drawn, they are wider by what is missing: the sum of the widths,
+    and so the part of every ray that meets hair, stays.
+    """
+    of = of or strands
+    width = render.width
+    if width is None:
+        width = float(_FIBRE * np.sqrt(max(_FULL / of, 1.0)))
+    return width * of / strands
 
 
 def projected_width(render: Render, camera: Camera, width: float, middle: NDArray[np.float64]) -> float:

@@ -33,7 +33,9 @@ class Render(Section):
     geometry: Literal["auto", "coverage", "tubes", "ribbons", "lines"] = "auto"
     """How strands are drawn: "coverage" is exact for any width and the fastest, "lines" are one sample wide; "auto" is coverage, and tubes from 3 px of width on, and prints its choice."""
     width: Annotated[Length, Field(gt=0)] | None = None
-    """Drawn width (diameter) of a strand; unset, a fibre's, widened to keep the coverage of 100,000 strands when there are fewer."""
+    """Drawn width (diameter) of a strand; unset, a fibre's, widened by the root of what is missing when there are fewer than 100,000."""
+    strands: Annotated[int, Field(ge=1)] | None = None
+    """Only the first so many strands are drawn, wider so that they cover what all would: for far cameras and quick looks."""
     taper: Fraction = 0.15
     """Fraction of a strand's length over which its tip thins out."""
     subdivide: Annotated[int, Field(ge=1, le=8)] = 1
