@@ -9,16 +9,19 @@ from pipeline import kernels
 _STEP = {
     "unit edges": 18,
     "bend: curvature, its derivative, force": 102,
-    "bend: stiffness across": 19,
+    "bend: stiffness across": 31,
     "rotor: residuals, derivatives, force": 175,
-    "stiffness of the edges: squares of 2 + 1 rows": 249,
     "stretch and tension": 28,
-    "rows of the point from those of the edges": 57,
     "air drag": 71,
-    "mass, drag and right side": 49,
+    "mass, drag and right sides": 52,
     "tension and strand ahead, velocity, edges after": 71,
 }
-_ELIMINATE = {"rows completed": 27, "Cholesky of 3 rows in 12": 446, "substitution": 63}
+_ELIMINATE = {
+    "squares of 2 + 1 rows, blocks": 198,
+    "window added, the next point for this one": 75,
+    "Cholesky of 3 rows in 12": 449,
+    "substitution": 66,
+}
 _LENGTHS = {"strain": 15, "tridiagonal step": 60}
 _NEAR = 45  # of a place that is only proved to be far from the head
 

@@ -72,102 +72,148 @@ template <class Real> struct Velocities {
     Lanes<Real> *spin; // of s; only "kirchhoff" solves for it
 };
 
-/// Mass and drag of point i, and the right side; `pull` is what the edges beside it pull, over m0.
-template <class Real, class Rows>
-RINGLET_INLINE void add_point(const Equation<Real> &eq, int i, Vec3<Real> pull, Rows &rows) {
+/// Mass and drag of point i, and its right side without what the edges pull.
+template <class Real>
+RINGLET_INLINE void add_point(const Equation<Real> &eq, int i, Lanes<Real> (&mass)[6], Lanes<Real> (&right)[3]) {
     const Block<Real> &b = eq.b;
     const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
     const Drag<Real> drag(b, eq.from, i, eq.settings, eq.step.wind);
-    Outer<Real> block(drag.t, theta_dt * (drag.c_par - drag.c_perp), 1 + theta_dt * drag.c_perp);
+    Outer<Real> own(drag.t, theta_dt * (drag.c_par - drag.c_perp), 1 + theta_dt * drag.c_perp);
     Vec3<Real> push = eq.step.gravity + drag.push;
     if (eq.outside) {
-        add_rate(*eq.outside, i, splat(theta_dt), block.entries);
+        add_rate(*eq.outside, i, splat(theta_dt), own.entries);
         push = push + eq.outside->push[i];
     }
-    for (int r = 0; r < 3; ++r)
-        for (int c = r; c < 3; ++c) rows.entries[r][c] += b.mu[i] * block.at(r, c);
-    const Vec3<Real> right = b.mu[i] * (eq.from.v[i] + splat(theta_dt) * push) + splat(theta_dt) * (pull + b.load[i]);
-    rows.right[0] = right.x, rows.right[1] = right.y, rows.right[2] = right.z;
+    for (int k = 0; k < 6; ++k) mass[k] = b.mu[i] * own.entries[k];
+    const Vec3<Real> to = b.mu[i] * (eq.from.v[i] + splat(theta_dt) * push) + splat(theta_dt) * b.load[i];
+    right[0] = to.x, right[1] = to.y, right[2] = to.z;
 }
 
 /// The row of a contact at point i: theta k dt^2 n n^T with k = 1e3 / dt^2, and its right side.
-template <class Real, class Window> RINGLET_INLINE void add_contact(const Equation<Real> &eq, int i, Window &window) {
+template <class Real>
+RINGLET_INLINE void add_contact(const Equation<Real> &eq, int i, Lanes<Real> (&mass)[6], Lanes<Real> (&right)[3]) {
     if (!any<Real>(eq.contacts.row[i] > 0)) return;
     const Vec3<Real> n = eq.contacts.n[i];
     const Lanes<Real> k = (Real(eq.settings.theta) * Real(kRow)) * eq.contacts.row[i];
-    window.add_row(n, k, dot(n, eq.from.v[i]) - Real(1 / eq.step.dt) * eq.contacts.gap[i]);
+    const Vec3<Real> to = (k * (dot(n, eq.from.v[i]) - Real(1 / eq.step.dt) * eq.contacts.gap[i])) * n;
+    const Outer<Real> row(n, k, Lanes<Real>{});
+    for (int e = 0; e < 6; ++e) mass[e] += row.entries[e];
+    right[0] += to.x, right[1] += to.y, right[2] += to.z;
 }
 
 /// Edges that a joint of the model reaches.
 template <Torsion torsion>
 inline constexpr int kSpan = torsion == Torsion::rotor ? 3 : torsion == Torsion::frenet ? 4 : 2;
 
+/// What begins at a point: bending and torsion as squares of rows g, and blocks, by the edges from there on; mass, air
+/// and load. Contacts are not among it.
+template <class Real, Torsion torsion> struct Terms {
+    using L = Lanes<Real>;
+    static constexpr int Unknowns = 3, Reach = 3 * kSpan<torsion>;
+    static constexpr int Count = torsion == Torsion::rotor ? 3 : torsion == Torsion::frenet ? 2 : 1;
+    static constexpr int length(int row) { return row + 1 == Count ? 6 : Reach; } // the last row is bending's
+
+    L g[Count][Reach];
+    Outer<Real> first, across; // at e_i with the stretching; at e_{i+1}, and minus between both
+    L by_edge[Reach], mass[6], by_point[3];
+
+    RINGLET_INLINE void add(int row, int column, L &sum) const {
+        if (column >= 6) return;
+        if (column < 3) sum += first.at(row, column);
+        else sum = row < 3 ? sum - across.at(row, column - 3) : sum + across.at(row - 3, column - 3);
+    }
+};
+
+template <class Real> struct Terms<Real, Torsion::kirchhoff> : RodRows<Real> {
+    using L = Lanes<Real>;
+    static constexpr int Unknowns = 4, Reach = RodRows<Real>::Reach;
+    static constexpr int length(int) { return Reach; }
+
+    Outer<Real> first; // at e_i
+    L by_edge[Reach], mass[6], by_point[3];
+
+    RINGLET_INLINE void add(int row, int column, L &sum) const {
+        const int p = row / 4, q = column / 4;
+        if (row % 4 == 3 && column % 4 == 3) sum += this->turning[p] * this->turning[q];
+        if (row % 4 == 3 && row == column) sum += this->least[p];
+        if (column < 3) sum += first.at(row, column);
+    }
+};
+
 /// The solver of one torsion model; it has memory for P points.
 template <class Real, Torsion torsion> class Solver {
     using L = Lanes<Real>;
+    using Begins = Terms<Real, torsion>;
     static constexpr bool turns = torsion == Torsion::kirchhoff;
-    static constexpr int Unknowns = turns ? 4 : 3;
-    using System = Assembly<Real, Unknowns, kSpan<torsion>>;
-    static constexpr int Band = System::Band, Reach = System::Reach;
-    using PointRows = Rows<Real, Unknowns, Band>;
+    static constexpr int Unknowns = Begins::Unknowns, Reach = Begins::Reach, Span = kSpan<torsion>;
 
   public:
     Solver(Arena &arena, int P)
-        : kept_(arena.take<PointRows>(P)), pivots_(arena.take<Pivots<Real, Unknowns, Band>>(P)) {}
+        : terms_(arena.take<Begins>(P)), pivots_(arena.take<Pivots<Real, Unknowns, Reach>>(P)), window_(arena),
+          joints_(arena.take<Joint<Real>>(turns ? P : 0)) {}
 
-    /// Solves for the velocities. `again`: as before but for the rows of contacts. To keep the rows for that costs a
+    /// Solves for the velocities. `again`: as before but for the rows of contacts. To keep the terms for that costs a
     /// tenth of a solve, so they are kept only after a step that has solved again; else they are assembled again.
     void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
         if (!again) keeps_ = eq.contacts.any_row && solved_again_;
         solved_again_ = again;
         const Block<Real> &b = eq.b;
-        const int first = turns ? std::max(b.first - 1, 0) : b.first; // segment first - 1 turns
+        const int first = std::max(b.first - 1, 0); // the edge before the first free point
         const Scale<Real> scale = stiffness_scale(eq);
-        System assembly;
-        Window<Real, Unknowns, Band> window;
+        window_.clear();
+        if constexpr (turns)
+            for (int i = 1; i + 1 < b.P; ++i)
+                joints_[i] = Joint<Real>(eq.edges.d[i - 1], eq.edges.d[i], eq.m[i - 1], eq.m[i], eq.from.twist[i]);
+        if constexpr (torsion == Torsion::rotor)
+            if (b.clamped) add_root(eq, scale, to.spin[0] * eq.edges.il[0]);
         for (int i = 0; i < b.P; ++i) {
-            if (again && keeps_) {
-                window.rows = kept_[i];
-            } else {
-                assemble(eq, i, scale, to, assembly, window.rows);
-                if (keeps_) kept_[i] = window.rows;
-            }
-            const Values known = known_at(i, to);
-            if (i < first) {
-                window.pass(known.value);
-                continue;
-            }
-            if (eq.contacts.any_row) add_contact(eq, i, window);
-            window.complete();
-            if (b.held_inside || i < b.first) window.impose(held_at(b, i).value, known.value);
-            window.eliminate(pivots_[i]);
+            Begins &terms = terms_[keeps_ ? i : 0];
+            if (!(again && keeps_)) assemble(eq, i, scale, terms);
+            if (i < first) pass(i, to, terms);
+            else eliminate(eq, i, to, terms);
         }
-        L known[Band]{};
+        L known[Reach + 3 - Unknowns]{};
         for (int i = b.P - 1; i >= first; --i) {
             pivots_[i].substitute(known);
+            if constexpr (turns) to.spin[i] = known[6];
+            if (b.held_inside || i < b.first) {
+                const L given[3] = {to.u[i].x, to.u[i].y, to.u[i].z};
+                for (int k = 0; k < 3; ++k) known[k] = select<Real>(b.free[i] > 0, known[k], given[k]);
+            }
             to.u[i] = {known[0], known[1], known[2]};
-            if constexpr (turns) to.spin[i] = known[3];
         }
     }
 
   private:
-    struct Values {
-        L value[Unknowns];
-    };
-
-    PointRows *kept_; // rows without contacts
+    Begins *terms_;
     bool keeps_ = false, solved_again_ = false;
-    Pivots<Real, Unknowns, Band> *pivots_;
+    Pivots<Real, Unknowns, Reach> *pivots_;
+    Window<Real, Unknowns, Reach> window_;
+    Joint<Real> *joints_;
 
-    RINGLET_INLINE static Values known_at(int i, const Velocities<Real> &at) {
-        if constexpr (turns) return {{at.u[i].x, at.u[i].y, at.u[i].z, at.spin[i]}};
-        else return {{at.u[i].x, at.u[i].y, at.u[i].z}};
+    /// Eliminates the edge at point i, with the point's contact.
+    RINGLET_INLINE void eliminate(const Equation<Real> &eq, int i, const Velocities<Real> &at, const Begins &terms) {
+        const Block<Real> &b = eq.b;
+        L mass[6], right[3];
+        for (int k = 0; k < 6; ++k) mass[k] = terms.mass[k];
+        for (int k = 0; k < 3; ++k) right[k] = terms.by_point[k];
+        if (eq.contacts.any_row) add_contact(eq, i, mass, right);
+        if (b.held_inside || i < b.first) {
+            const Vec3<Real> u = at.u[i];
+            const L held = 1 - b.free[i];
+            const Held<Real> known = {held, turns ? 1 - b.turns[i] : L{}, {u.x, u.y, u.z}, turns ? at.spin[i] : L{}};
+            window_.eliminate_held(terms, mass, right, known, pivots_[i]);
+        } else {
+            window_.eliminate(terms, mass, right, pivots_[i]);
+        }
     }
 
-    RINGLET_INLINE static Values held_at(const Block<Real> &b, int i) {
-        const L held = 1 - b.free[i];
-        if constexpr (turns) return {{held, held, held, 1 - b.turns[i]}};
-        else return {{held, held, held}};
+    /// Moves on from point i where all lanes hold it and the next one.
+    void pass(int i, const Velocities<Real> &at, const Begins &terms) {
+        const Vec3<Real> u = at.u[i], e = at.u[i + 1] - u;
+        const L point[3] = {u.x, u.y, u.z};
+        if constexpr (turns) window_.pass(terms, point, {e.x, e.y, e.z, at.spin[i]});
+        else window_.pass(terms, point, {e.x, e.y, e.z});
     }
 
     /// theta dt (theta dt + beta) over m0, and its part without beta.
@@ -177,95 +223,100 @@ template <class Real, Torsion torsion> class Solver {
         return {square_root<Real>(square), 1 / square, theta_dt / (theta_dt + Real(eq.settings.damping))};
     }
 
-    /// The rows of point i without contacts.
-    RINGLET_INLINE static void assemble(const Equation<Real> &eq, int i, const Scale<Real> &scale,
-                                        const Velocities<Real> &known, System &assembly, PointRows &rows) {
-        const Block<Real> &b = eq.b;
-        assembly.open();
-        Outer<Real> stretching;
-        if (i + 1 < b.P) {
-            stretching = stretch(b, eq.edges, i, eq.from.T[i], eq.step.dt, eq.settings.theta);
-            assembly.edge(0) = assembly.edge(0) + tension(eq.edges, i, eq.from.T[i]);
-        }
-        if constexpr (turns) add_joint(eq, i, scale, stretching, assembly);
-        else add_joints(eq, i, scale, stretching, assembly);
-        if constexpr (torsion == Torsion::rotor)
-            if (i == 0 && b.clamped) add_root(eq, scale, known.spin[0] * eq.edges.il[0], assembly);
-#pragma GCC unroll 4
-        for (int a = 0; a < Unknowns; ++a) assembly.row(a, rows.entries[a]);
-        add_point(eq, i, b.per_mass * assembly.pull(), rows);
-        if constexpr (turns) add_turn(eq, i, assembly.fourth(0), rows);
+    /// What a gradient is in a right side.
+    static L force_scale(const Equation<Real> &eq) {
+        return (-Real(eq.settings.theta) * Real(eq.step.dt)) * eq.b.per_mass;
     }
 
-    /// The row of s of segment i; the last point has no segment.
-    RINGLET_INLINE static void add_turn(const Equation<Real> &eq, int i, L F_theta, PointRows &rows) {
-        const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
-        const bool is_last = i + 1 == eq.b.P;
-        rows.entries[3][3] += splat(is_last ? Real(1) : Real(kLeastSpin));
-        rows.right[3] = is_last ? L{} : -theta_dt * eq.b.per_mass * eq.edges.il[i] * F_theta;
+    /// What begins at point i, without contacts.
+    RINGLET_INLINE void assemble(const Equation<Real> &eq, int i, const Scale<Real> &scale, Begins &terms) {
+        const Block<Real> &b = eq.b;
+        Vec3<Real> F[Span]{}; // gradient by the edges from edge i on, and by their fourth unknowns
+        L F_theta[Span]{};
+        if (i + 1 < b.P) {
+            terms.first = stretch(b, eq.edges, i, eq.from.T[i], eq.step.dt, eq.settings.theta);
+            F[0] = tension(eq.edges, i, eq.from.T[i]);
+        } else {
+            terms.first = {};
+        }
+        if constexpr (turns) add_joint(eq, i, scale, F, F_theta, terms);
+        else add_joints(eq, i, scale, F, terms);
+        const L force = force_scale(eq);
+        for (int j = 0; j < Span; ++j) {
+            L *right = terms.by_edge + Unknowns * j;
+            right[0] = force * F[j].x, right[1] = force * F[j].y, right[2] = force * F[j].z;
+            if constexpr (turns) right[3] = i + 2 < b.P ? force * eq.edges.il[i + j] * F_theta[j] : L{};
+        }
+        add_point(eq, i, terms.mass, terms.by_point);
     }
 
     /// Bending and torsion that begin with edge i, and the stiffness by that edge.
-    RINGLET_INLINE static void add_joints(const Equation<Real> &eq, int i, const Scale<Real> &scale,
-                                          const Outer<Real> &stretching, System &assembly) {
+    RINGLET_INLINE static void add_joints(const Equation<Real> &eq, int i, const Scale<Real> &scale, Vec3<Real> *F,
+                                          Begins &terms) {
         const Block<Real> &b = eq.b;
-        BendStiffness<Real> bending;
         if (i + 2 < b.P) {
             Bend<Real> bend(b, eq.edges, i + 1, scale);
             bend.look_back(eq.edges, i);
-            bend.add_gradient(scale, &assembly.edge(0));
-            bending = BendStiffness<Real>(bend);
-            bending.look_back(eq.edges, i, scale, &assembly.edge(0));
+            bend.add_gradient(scale, F);
+            terms.across = stiffness_across(bend);
+            look_back(terms.across, eq.edges, i, scale, F);
+            terms.first.add(splat(Real(1)), terms.across);
+            write_rows(bend, terms.g + Begins::Count - 1);
+        } else { // only here: zeros are written slowly
+            terms.across = {};
+            for (auto &row : terms.g) std::fill(std::begin(row), std::end(row), L{});
         }
-        L g[torsion == Torsion::rotor ? 2 : 1][Reach]{};
         if constexpr (torsion == Torsion::rotor)
-            if (i + 3 < b.P) add_rows(eq, i, Rotor<Real>(b, eq.edges, i + 1, scale), scale, assembly, g);
+            if (i + 3 < b.P) add_torsion(eq, i, Rotor<Real>(b, eq.edges, i + 1, scale), scale, F, terms);
         if constexpr (torsion == Torsion::frenet)
-            if (i + 4 < b.P) add_rows(eq, i, Frenet<Real>(b, eq.edges, i + 2, scale), scale, assembly, g);
-        assembly.fill(g, [&](int row, int column, L &sum) RINGLET_ALWAYS {
-            bending.add(row, column, sum);
-            if (column < 3) sum += stretching.at(row, column);
-        });
+            if (i + 4 < b.P) add_torsion(eq, i, Frenet<Real>(b, eq.edges, i + 2, scale), scale, F, terms);
+        if (i + Span >= b.P && i + 2 < b.P)
+            for (int k = 0; k + 1 < Begins::Count; ++k) std::fill(std::begin(terms.g[k]), std::end(terms.g[k]), L{});
     }
 
+    /// Torsion that begins with edge i.
     template <int Count, int Edges>
-    RINGLET_INLINE static void add_rows(const Equation<Real> &eq, int i, Squares<Real, Count, Edges> joint,
-                                        const Scale<Real> &scale, System &assembly, L (&g)[Count][Reach]) {
+    RINGLET_INLINE static void add_torsion(const Equation<Real> &eq, int i, Squares<Real, Count, Edges> joint,
+                                           const Scale<Real> &scale, Vec3<Real> *F, Begins &terms) {
         joint.look_back(eq.edges, i);
-        joint.add_gradient(scale, &assembly.edge(0));
-        write_rows(joint, g);
+        joint.add_gradient(scale, F);
+        write_rows(joint, terms.g);
     }
 
     /// "rotor" at a clamped root; its director turns at a known rate [1/s].
-    RINGLET_INLINE static void add_root(const Equation<Real> &eq, const Scale<Real> &scale, L rate, System &assembly) {
+    void add_root(const Equation<Real> &eq, const Scale<Real> &scale, L rate) {
         RootBend<Real> root(eq.b, eq.edges, eq.m[0], scale);
         root.look_back(eq.edges, 0);
         L g[2][6];
         write_rows(root, g);
+        Vec3<Real> F[2]{};
         for (int a = 0; a < 2; ++a) {
             for (int r = 0; r < 6; ++r)
-                for (int c = r; c < 6; ++c) assembly.at(r, c) += g[a][r] * g[a][c];
+                for (int c = r; c < 6; ++c) window_.left(r, c) += g[a][r] * g[a][c];
             root.r[a] += Real(eq.settings.theta * eq.step.dt + eq.settings.damping) * root.by_theta[a] * rate;
         }
-        root.add_gradient(scale, &assembly.edge(0));
+        root.add_gradient(scale, F);
+        const L force = force_scale(eq);
+        for (int j = 0; j < 2; ++j) {
+            window_.right(3 * j) += force * F[j].x;
+            window_.right(3 * j + 1) += force * F[j].y;
+            window_.right(3 * j + 2) += force * F[j].z;
+        }
     }
 
-    /// The joint of "kirchhoff" that begins with edge i, and the stiffness by that edge.
-    RINGLET_INLINE static void add_joint(const Equation<Real> &eq, int i, const Scale<Real> &scale,
-                                         const Outer<Real> &stretching, System &assembly) {
+    /// The joint of "kirchhoff" that begins with edge i, and the stiffness by that edge. The last point has no edge.
+    RINGLET_INLINE void add_joint(const Equation<Real> &eq, int i, const Scale<Real> &scale, Vec3<Real> *F,
+                                         L *F_theta, Begins &terms) {
         const Block<Real> &b = eq.b;
-        RodRows<Real> rows{};
         if (i + 2 < b.P) {
-            const Joint<Real> q(eq.edges.d[i], eq.edges.d[i + 1], eq.m[i], eq.m[i + 1], eq.from.twist[i + 1]);
-            add_joint_gradient(Moments<Real>(b, i + 1, q), q, eq.edges, i + 1, &assembly.edge(0), &assembly.fourth(0));
-            rows = RodRows<Real>(b, eq.edges, i + 1, q, scale);
-            rows.look_back(eq.edges, i, scale, &assembly.edge(0), &assembly.fourth(0));
+            const Joint<Real> q = joints_[i + 1];
+            add_joint_gradient(Moments<Real>(b, i + 1, q), q, eq.edges, i + 1, F, F_theta);
+            terms.derive(b, eq.edges, i + 1, q, scale);
+            terms.look_back(eq.edges, i, scale, F, F_theta);
+        } else {
+            static_cast<RodRows<Real> &>(terms) = {};
         }
-        assembly.fill(rows.row, [&](int row, int column, L &sum) RINGLET_ALWAYS {
-            if (row % 4 == 3 && column % 4 == 3) sum += rows.turning[row / 4] * rows.turning[column / 4];
-            if (row % 4 == 3 && column == row) sum += rows.least[row / 4];
-            if (column < 3) sum += stretching.at(row, column);
-        });
+        terms.least[0] += splat(i + 1 == b.P ? Real(1) : Real(kLeastSpin));
     }
 };
 

@@ -145,14 +145,14 @@ RINGLET_INLINE Lanes<Real> turning_stiffness(const Block<Real> &b, int i, const 
 /// K stays positive, the block of points and twist is exact for B1 = B2, and turning an isotropic section costs nothing.
 template <class Real> struct RodRows {
     using L = Lanes<Real>;
-    L row[3][8];
+    static constexpr int Count = 3, Reach = 8;
+    L g[Count][Reach];
     L turning[2]; // a fourth row that has s only: what the exact stiffness of a common turn has on top
     L least[2];   // on the diagonal of s
 
-    RodRows() = default;
-
-    RINGLET_INLINE RodRows(const Block<Real> &b, const Edges<Real> &edges, int i, const Joint<Real> &q,
-                           const Scale<Real> &scale) {
+    /// Of joint i.
+    RINGLET_INLINE void derive(const Block<Real> &b, const Edges<Real> &edges, int i, const Joint<Real> &q,
+                               const Scale<Real> &scale) {
         const L root = scale.root * b.root_dl[i] * b.inverse_dl[i];
         const L weight[3] = {root * b.root_kappa, root * b.root_kappa_2, root * b.root_tau};
         const L il0 = edges.il[i - 1], il1 = edges.il[i], B1 = b.k_kappa, B2 = b.k_kappa_2, one = splat(Real(1));
@@ -170,7 +170,8 @@ template <class Real> struct RodRows {
             after[1] * (q.a2 - (Real(0.5) * q.k2) * tt + (Real(0.25) * q.k2) * qb), c2 * before[1], c2 * after[1]);
         set(2, before[2] * kb, after[2] * kb, -before[2], after[2]);
         const L more = turning_stiffness(b, i, q) - 4 * (B1 * c1 * c1 + B2 * c2 * c2);
-        const L common = Real(0.5) * root * square_root<Real>(scale.undamped * maximum<Real>(more, splat(Real(0))));
+        const L square = scale.undamped * maximum<Real>(more, splat(Real(0)));
+        const L common = Real(0.5) * root * square * inverse_root<Real>(square + Real(1e-30));
         turning[0] = common * il0, turning[1] = common * il1;
         const L held = kLeastTwisting<Real> * (weight[0] * weight[0] + weight[2] * weight[2]);
         least[0] = held * il0 * il0, least[1] = held * il1 * il1;
@@ -180,13 +181,13 @@ template <class Real> struct RodRows {
     RINGLET_INLINE void look_back(const Edges<Real> &edges, int i, const Scale<Real> &scale, Vec3<Real> *F,
                                   L *D_theta) const {
         if (!edges.ahead) return;
-        for (const L(&g)[8] : row) {
-            const Vec3<Real> g0 = {g[0], g[1], g[2]}, g1 = {g[4], g[5], g[6]};
+        for (const L(&row)[Reach] : g) {
+            const Vec3<Real> g0 = {row[0], row[1], row[2]}, g1 = {row[4], row[5], row[6]};
             const L moment = scale.inverse * (dot(g0, edges.ahead[i]) + dot(g1, edges.ahead[i + 1]) +
-                                              g[3] * edges.ahead_s[i] + g[7] * edges.ahead_s[i + 1]);
+                                              row[3] * edges.ahead_s[i] + row[7] * edges.ahead_s[i + 1]);
             F[0] = F[0] - moment * g0, F[1] = F[1] - moment * g1;
-            D_theta[0] -= moment * g[3] * reciprocal<Real>(edges.il[i]);
-            D_theta[1] -= moment * g[7] * reciprocal<Real>(edges.il[i + 1]);
+            D_theta[0] -= moment * row[3] * reciprocal<Real>(edges.il[i]);
+            D_theta[1] -= moment * row[7] * reciprocal<Real>(edges.il[i + 1]);
         }
         const L common = scale.inverse / scale.undamped *
                          (turning[0] * edges.ahead_s[i] + turning[1] * edges.ahead_s[i + 1]);
@@ -196,9 +197,9 @@ template <class Real> struct RodRows {
 
   private:
     RINGLET_INLINE void set(int r, Vec3<Real> D0, Vec3<Real> D1, L s0, L s1) {
-        L *g = row[r];
-        g[0] = D0.x, g[1] = D0.y, g[2] = D0.z, g[3] = s0;
-        g[4] = D1.x, g[5] = D1.y, g[6] = D1.z, g[7] = s1;
+        L *row = g[r];
+        row[0] = D0.x, row[1] = D0.y, row[2] = D0.z, row[3] = s0;
+        row[4] = D1.x, row[5] = D1.y, row[6] = D1.z, row[7] = s1;
     }
 };
 

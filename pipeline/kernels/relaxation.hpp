@@ -62,7 +62,7 @@ template <class Real> struct Lengths {
                 right[j] -= factor * right[j - 1];
             }
             Mask<Real> fixed = ~(diagonal > least); // 0 between two held points
-            inverse[j] = select<Real>(fixed, none, 1 / diagonal);
+            inverse[j] = select<Real>(fixed, none, reciprocal<Real>(diagonal));
             if (j + 1 == end) break;
             across = contacts.a[j + 1] * dot(contacts.n[j + 1], d[j + 1]);
             coupling = -b.w[j + 1] * il2 * (b.inverse_l[j + 1] * b.inverse_l[j + 1]) *

@@ -33,6 +33,10 @@ template <class Real> struct Outer {
         entries[3] = wa.y * a.y + diagonal, entries[4] = wa.y * a.z, entries[5] = wa.z * a.z + diagonal;
     }
 
+    RINGLET_INLINE void add(Lanes<Real> times, const Outer &other) {
+        for (int k = 0; k < 6; ++k) entries[k] += times * other.entries[k];
+    }
+
     friend RINGLET_INLINE Vec3<Real> operator*(const Outer &a, Vec3<Real> b) {
         return {a.entries[0] * b.x + a.entries[1] * b.y + a.entries[2] * b.z,
                 a.entries[1] * b.x + a.entries[3] * b.y + a.entries[4] * b.z,
@@ -46,8 +50,8 @@ template <class Real> struct Outer {
 };
 
 /// The derivatives of a joint's residuals as numbers, over the first edges of a window.
-template <class Real, int Count, int Reach>
-RINGLET_INLINE void write_rows(const Squares<Real, Count, Reach> &joint, Lanes<Real> (&rows)[Count][3 * Reach]) {
+template <class Real, int Count, int Reach, int Columns>
+RINGLET_INLINE void write_rows(const Squares<Real, Count, Reach> &joint, Lanes<Real> (*rows)[Columns]) {
     for (int k = 0; k < Count; ++k)
         for (int j = 0; j < Reach; ++j) {
             const Vec3<Real> g = joint.g[k][j];
@@ -55,33 +59,20 @@ RINGLET_INLINE void write_rows(const Squares<Real, Count, Reach> &joint, Lanes<R
         }
 }
 
-/// Stiffness of a bend by its two edges.
-template <class Real> struct BendStiffness {
-    Lanes<Real> g[1][6]{};
-    Outer<Real> across{}; // across c, by both edges alike: + at the diagonal blocks, - beside them
+/// Stiffness of a bend across c, by both edges alike: + at their diagonal blocks, - beside them.
+template <class Real> RINGLET_INLINE Outer<Real> stiffness_across(const Bend<Real> &bend) {
+    return {bend.c, -bend.open * reciprocal<Real>(bend.cc + Real(1e-12)), bend.open};
+}
 
-    BendStiffness() = default;
-
-    RINGLET_INLINE explicit BendStiffness(const Bend<Real> &bend)
-        : across(bend.c, -bend.open * reciprocal<Real>(bend.cc + Real(1e-12)), bend.open) {
-        write_rows(bend, g);
-    }
-
-    /// What the stiffness across adds to the gradient F by the two edges, extrapolated back to the step's start.
-    RINGLET_INLINE void look_back(const Edges<Real> &edges, int i, const Scale<Real> &scale, Vec3<Real> *F) const {
-        if (!edges.ahead) return;
-        const Vec3<Real> back = (scale.inverse / scale.undamped) * (across * (edges.ahead[i] - edges.ahead[i + 1]));
-        F[0] = F[0] - back;
-        F[1] = F[1] + back;
-    }
-
-    RINGLET_INLINE void add(int row, int column, Lanes<Real> &sum) const {
-        if (column >= 6) return;
-        const Lanes<Real> open = across.at(row % 3, column % 3);
-        sum += g[0][row] * g[0][column];
-        sum = row / 3 == column / 3 ? sum + open : sum - open;
-    }
-};
+/// What the stiffness across adds to the gradient F by the two edges, extrapolated back to the step's start.
+template <class Real>
+RINGLET_INLINE void look_back(const Outer<Real> &across, const Edges<Real> &edges, int i, const Scale<Real> &scale,
+                              Vec3<Real> *F) {
+    if (!edges.ahead) return;
+    const Vec3<Real> back = (scale.inverse / scale.undamped) * (across * (edges.ahead[i] - edges.ahead[i + 1]));
+    F[0] = F[0] - back;
+    F[1] = F[1] + back;
+}
 
 /// Stretch of segment j, and the stiffness of its tension T, in the units of the system.
 template <class Real>

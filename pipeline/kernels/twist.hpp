@@ -86,7 +86,8 @@ template <class Real> class Directors {
   public:
     L *spin; // velocity of s = l theta: known for held directors, else from the solve
 
-    Directors(Arena &arena, int P) : spin(arena.take<L>(P)), t_(arena.take<Vec3<Real>>(P)) {
+    Directors(Arena &arena, int P)
+        : spin(arena.take<L>(P)), t_(arena.take<Vec3<Real>>(P)), joints_(arena.take<Joint<Real>>(P)) {
         for (auto **array : {&inverse_, &upper_, &right_}) *array = arena.take<L>(P);
     }
 
@@ -140,12 +141,14 @@ template <class Real> class Directors {
     /// unless null, tells how far directors have turned.
     void relax(const Block<Real> &b, const Vec3<Real> *t, Vec3<Real> *m, L *twist, L *by) {
         const L none = splat(Real(0)), one = splat(Real(1));
+        // Joints for themselves: each is a long chain of operations, and many of them go side by side
+        for (int i = 1; i < b.P - 1; ++i) joints_[i] = Joint<Real>(t[i - 1], t[i], m[i - 1], m[i], twist[i]);
         L diagonal = none, force = none, coupling = none; // of segment j: from the joint before it
         for (int j = 0; j < b.P - 1; ++j) {
             L next_diagonal = none, next_force = none, next_coupling = none;
             if (j + 1 < b.P - 1) {
                 const int i = j + 1;
-                const Joint<Real> q(t[j], t[i], m[j], m[i], twist[i]);
+                const Joint<Real> &q = joints_[i];
                 const Moments<Real> at(b, i, q);
                 const L both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1), per_length = b.inverse_dl[i];
                 const L g = Real(0.25) * maximum<Real>(turning_stiffness(b, i, q), none);
@@ -176,6 +179,7 @@ template <class Real> class Directors {
 
   private:
     Vec3<Real> *t_;
+    Joint<Real> *joints_;
     L *inverse_, *upper_, *right_; // of the eliminated tridiagonal matrix
 };
 
