@@ -72,10 +72,10 @@ def results(radius: float, pitch: float, random_phase: bool) -> dict[str, Floats
 @pytest.mark.parametrize(
     ("radius", "pitch", "random_phase", "measured"),
     [
-        (1e-5, 0.02, False, 0.0184),
-        (0.005, 0.02, False, 0.0107),
-        (0.005, 0.02, True, 0.0267),
-        (0.003, 0.01, True, 0.0139),
+        (1e-5, 0.02, False, 0.0138),
+        (0.005, 0.02, False, 0.0081),
+        (0.005, 0.02, True, 0.0248),
+        (0.003, 0.01, True, 0.0125),
     ],
     ids=["straight", "curly", "curly, random phase", "tight, random phase"],
 )

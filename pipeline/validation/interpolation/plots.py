@@ -54,6 +54,7 @@ def _guides(figure: Any, report: Report) -> None:
                 label = f"{choice}, {'hair on hair' if hair == 'grid' else 'without'}"
                 axes.loglog(report.plan.guides, errors, line, marker="o", ms=3, color=colour, label=label)
         axes.set_title(kind.name, fontsize="small")
+        axes.set_xlabel("guides", fontsize="x-small")
         axes.set_xticks(report.plan.guides, [f"{count}" for count in report.plan.guides], fontsize="x-small")
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter("{x:g}")
@@ -63,6 +64,5 @@ def _guides(figure: Any, report: Report) -> None:
     for axes in grid[len(kinds) :]:
         axes.set_axis_off()
     grid[0].set_ylabel("mean error [% of length]")
-    figure.supxlabel("guides", fontsize="small")
     handles = grid[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=4, frameon=False, fontsize="small")
