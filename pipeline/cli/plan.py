@@ -1,6 +1,7 @@
 """What a config will cost, from formulas that are linear in the counts.
 
-The coefficients were fitted on two cores with AVX-512; they tell minutes from hours, not seconds apart.
+The coefficients were fitted on two cores with AVX-512. Memory and disk are right within a fifth from 10,000 to a million
+strands (tests/cli/test_plan.py checks a small one); times tell minutes from hours, not seconds apart.
 """
 
 import os
@@ -12,23 +13,33 @@ from pipeline.config import Config
 _GB = 1e9
 _FITTED_THREADS = 2
 _START_S = 0.8  # interpreter, libraries
-_START_GB = 0.09
+_START_GB = 0.1
 _VTK_GB = 0.46
-_GROOM_GB = 0.39  # head, and chunks of strands in two threads
+_GROOM_GB = 0.23  # head and scalp
+_GROOM_CHUNK_GB = 0.1  # strands in flight while they grow
+_GROOM_CHUNK = 50_000
 _DEFLATED = 0.93  # float32 positions after shuffle and deflate
+_GROOM_DEFLATED = 0.8  # and those of a groom, whose strands run side by side
+_BOUND_DEFLATED = 0.65  # guides, weights, roots and keys
+_GROOM_ROW = 16  # [bytes] of a strand beside its points: normal and key
+_HEAD_STORED_GB = 0.0036  # its meshes
 _HEAD_M3 = 0.02  # box around a head that holds its distance grid
 
 _GROOM_S_PER_POINT = 2.7e-6
-_GROOM_B_PER_STRAND = 100
+_GROOM_B_PER_STRAND = 60  # roots, and partings looked for between them
 _HEAD_S_PER_VOXEL = 4.5e-6
 _STEP_S_PER_POINT = {"float32": 40e-9, "float64": 80e-9}
+_GUIDE_B_PER_POINT = 1300
 _BIND_S_PER_STRAND = 4e-6
+_BIND_B_PER_STRAND = 40  # roots and their neighbours; the binding itself is written chunk by chunk
 _RENDER_S_PER_POINT = 0.45e-6
 _RENDER_S_PER_SAMPLE = 0.05e-6
-_RENDER_B_PER_POINT = 60  # of the strands in flight
+_RENDER_B_PER_POINT = 30  # of the strands in flight
 _RENDER_B_PER_SAMPLE = 60
+_RENDER_B_PER_SEGMENT = 70  # of strands that may be seen, sorted into tiles
+_BOUND_B = 70  # of a strand's binding in memory, and its order
 _IN_FLIGHT = 65_536  # strands: the renderer's chunk
-_KEPT_B = 400e6  # points that the renderer keeps between its two passes
+_KEPT_B = 100 << 20  # points that the renderer keeps between its two passes
 _PNG_B_PER_PIXEL = 0.5
 
 
@@ -61,9 +72,12 @@ def _groom(config: Config) -> Cost:
     points = config.groom.strands * config.groom.points
     voxels = 0.0 if config.scene.head == "none" else _HEAD_M3 / config.simulate.contact.spacing**3
     seconds = _START_S + (_GROOM_S_PER_POINT * points + _HEAD_S_PER_VOXEL * voxels) * _slower()
-    stored = (12 * points + 4 * voxels) * _DEFLATED
-    memory = _START_GB + _GROOM_GB + _GROOM_B_PER_STRAND * config.groom.strands / _GB
-    return Cost(memory, stored / _GB, seconds)
+    strands = config.groom.strands
+    stored = (12 * points + _GROOM_ROW * strands) * _GROOM_DEFLATED + 4 * voxels * _DEFLATED
+    head = _HEAD_STORED_GB if voxels else 0.0
+    chunk = _GROOM_CHUNK_GB * min(1.0, strands / _GROOM_CHUNK)
+    memory = _START_GB + _GROOM_GB + chunk + _GROOM_B_PER_STRAND * strands / _GB
+    return Cost(memory, head + stored / _GB, seconds)
 
 
 def _simulate(config: Config) -> Cost:
@@ -71,30 +85,38 @@ def _simulate(config: Config) -> Cost:
     points = config.groom.guides * config.groom.points
     steps = (simulate.frames + simulate.settle * simulate.fps) * simulate.substeps
     seconds = _START_S + _STEP_S_PER_POINT[simulate.precision] * points * steps * _slower()
-    return Cost(_START_GB + 1000 * points / _GB, simulate.frames * 12 * points * _DEFLATED / _GB, seconds)
+    return Cost(
+        _START_GB + _GUIDE_B_PER_POINT * points / _GB,
+        simulate.frames * 12 * points * _DEFLATED / _GB,
+        seconds,
+    )
 
 
 def _interpolate(config: Config) -> Cost:
     strands = _strands(config)
     row = 28 + 8 * config.interpolate.guides_per_strand
     return Cost(
-        _START_GB + 10 * row * strands / _GB,
-        row * strands * _DEFLATED / _GB,
+        _START_GB + 0.012 + _BIND_B_PER_STRAND * strands / _GB,
+        row * strands * _BOUND_DEFLATED / _GB,
         _START_S + _BIND_S_PER_STRAND * strands,
     )
 
 
 def _render(config: Config) -> Cost:
     render, frames = config.render, config.simulate.frames
-    points = _strands(config) * config.groom.points * render.subdivide
+    strands = min(render.strands or _strands(config), _strands(config))
+    points = strands * config.groom.points * render.subdivide
     pixels = render.size[0] * render.size[1]
     samples = pixels * render.samples**2
     frame = _RENDER_S_PER_POINT * points * _slower() + _RENDER_S_PER_SAMPLE * samples * _slower()
-    all_points = 12 * _strands(config) * config.groom.points
+    all_points = 12 * strands * config.groom.points
     kept = all_points if all_points <= _KEPT_B else 0
-    in_flight = points * min(1.0, _IN_FLIGHT / _strands(config))
-    shapes = 12 * config.groom.strands * config.groom.points + 60 * _strands(config)
+    in_flight = points * min(1.0, _IN_FLIGHT / strands)
+    shapes = 12 * min(config.groom.strands, _strands(config)) * config.groom.points + _BOUND_B * _strands(
+        config
+    )
     memory = kept + shapes + _RENDER_B_PER_POINT * in_flight + _RENDER_B_PER_SAMPLE * samples
+    memory += _RENDER_B_PER_SEGMENT * points
     return Cost(
         _START_GB + _VTK_GB + memory / _GB,
         frames * pixels * _PNG_B_PER_PIXEL / _GB,

@@ -248,3 +248,18 @@ def test_what_does_not_fit_is_refused() -> None:
         expansion.chunk(0, 10, np.empty((9, POINTS, 3), np.float32))
     with pytest.raises(IndexError):
         expansion.chunk(0, expansion.count + 1)
+
+
+def test_strand_123_is_the_same_at_a_thousand_a_hundred_thousand_and_a_million() -> None:
+    """A groom of 700 strands: strand 123 is its own, strand 823 a copy; binding and points, to the byte."""
+    groom, rest = round_groom(700, 12, GUIDES)
+    guides = rest[groom.guides.strand]
+    found = []
+    for count in (1_000, 100_000, 1_000_000):
+        binding = whole(groom, Interpolate(strands=count), seed=5)
+        expansion = Expansion(rest, guides, binding, sphere(), VARIED)
+        expansion.frame(swung(guides, 1.0), TURNED)
+        rows = [getattr(binding, name)[[123, 823]].tobytes() for name in vars(binding)]
+        found.append((rows, expansion.chunk(123, 124).tobytes(), expansion.chunk(100, 900)[723].tobytes()))
+    print(f"{sum(map(len, found[0][0]))} bytes of binding, {len(found[0][1])} bytes of points each")
+    assert found[0] == found[1] == found[2]
