@@ -25,6 +25,7 @@ _CROWN, _BREADTH, _OCCIPUT, _TOP = 0.131, 0.158, -0.0876, 0.075
 
 _SAMPLES = 2000  # of the mannequin's skin
 _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])  # steps of the R2 sequence
+_OUTSIDE, _STEPS = 0.16, 14  # [m] from the chart's centre, and steps from there to the skin
 _NECK, _SKULL = -0.11, -0.02  # [m] heights above which points are compared, and fitted
 _ROUNDS, _KEPT = 12, 0.85
 _FARTHEST = 0.04  # [m] more than this does not matter
@@ -84,8 +85,13 @@ def _first_guess(p: Vectors) -> tuple[float, Vectors]:
 def _skin() -> Vectors:
     """Points (N, 3) [m] of the mannequin's skin above its neck."""
     uv = 2 * ((0.5 + np.arange(_SAMPLES)[:, None] * _PLASTIC) % 1) - 1
-    points = scalp.on_skin(distance.distance, uv[np.hypot(*uv.T) < 0.98])
-    return points[points[:, 1] > _NECK]
+    chart = scalp.chart()
+    ray = chart.rays(uv[np.hypot(*uv.T) < 0.98])
+    reach = np.full(len(ray), _OUTSIDE)
+    for _ in range(_STEPS):  # sphere tracing
+        reach -= distance.distance(chart.center + reach[:, None] * ray)
+    points = chart.center + reach[:, None] * ray
+    return np.asarray(points[points[:, 1] > _NECK])
 
 
 @cache

@@ -23,7 +23,7 @@ from pipeline.errors import InputError
 from pipeline.groom.axes import file_axis
 from pipeline.groom.fit import better_turned, fit_skull
 from pipeline.groom.head import scalp
-from pipeline.groom.head_field import Field, distance_grid
+from pipeline.groom.head_field import Field
 from pipeline.groom.region import Region
 from pipeline.progress import say
 from pipeline.strands.chart import Chart
@@ -66,6 +66,8 @@ class Head:
     """Painted numbers (V,) on the points of the skin, by name."""
     texture: NDArray[np.float32] | None = None
     """(T, 3, 2) texture coordinates of the corners of its triangles, if it has any."""
+    closest: kernels.MeshDistance | None = None
+    """Finds the triangles of the skin that are nearest to points, world; for paint and texture coordinates."""
     region: Region = default(default_factory=Region)
     """Where hair grows."""
 
@@ -124,12 +126,8 @@ class Head:
 
     def _feet(self, p: Points) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """The triangle nearest to each fitted point (N, 3), and the weights (N, 3) of its corners there."""
-        return self._mesh.feet(np.ascontiguousarray(self.to_world(p), np.float64))
-
-    @cached_property
-    def _mesh(self) -> kernels.MeshDistance:
-        grid = Grid.around(self.skin.points, self.field.spacing)
-        return grid.measure(self.skin.points, self.skin.triangles)
+        assert self.closest is not None
+        return self.closest.feet(np.ascontiguousarray(self.to_world(p), np.float64))
 
     def to_world(self, p: Points) -> Points:
         """Fitted coordinates to world coordinates."""
@@ -150,9 +148,11 @@ def _mannequin(config: Config) -> Head:
     from pipeline.groom.head import distance, skin, surface
 
     points, triangles, normals = surface.contour()
+    field, closest = _measured(points, triangles, config)
     return Head(
         skin=Skin(points, triangles, normals, skin.albedo(points, normals, config.scene.skin)),
-        field=distance_grid(points, triangles, config.simulate.contact.spacing),
+        field=field,
+        closest=closest,
         scale=1.0,
         offset=np.zeros(3),
         project=lambda p: distance.foot(p, steps=1, reach=surface.REACH),
@@ -176,7 +176,7 @@ def _from_mesh(config: Config) -> Head:
         )
     normals = point_normals(points, triangles).astype(np.float32)
     tone = srgb_to_linear(np.array(load_table()["skin"][scene.skin]))
-    field = distance_grid(points, triangles, config.simulate.contact.spacing)
+    field, closest = _measured(points, triangles, config)
     region = Region(config.groom.scalp)
     placement = _fitted(config, points, field, region)
     scale, offset = placement.scale, np.array(placement.offset)
@@ -184,6 +184,7 @@ def _from_mesh(config: Config) -> Head:
     return Head(
         skin=Skin(points, triangles, normals, albedo),
         field=field,
+        closest=closest,
         scale=scale,
         offset=offset,
         project=_grid_feet(field.rescaled(scale, offset)),
@@ -191,6 +192,14 @@ def _from_mesh(config: Config) -> Head:
         texture=mesh.uv,
         region=region,
     )
+
+
+def _measured(
+    points: Points, triangles: NDArray[np.integer], config: Config
+) -> tuple[Field, kernels.MeshDistance]:
+    grid = Grid.around(points, config.simulate.contact.spacing)
+    closest = grid.measure(points, triangles)
+    return Field(closest.values, grid.origin, grid.spacing), closest
 
 
 def _fitted(config: Config, points: Points, field: Field, region: Region) -> Placement:
