@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.body.frames import BodyFrames
+from pipeline.body.placement import Placement
 from pipeline.body.roots import SkinRoots
 from pipeline.cache.store import Reader
 from pipeline.config import Config
@@ -36,6 +37,14 @@ def distance_field(groom: Reader) -> kernels.DistanceField | None:
         return None
     values, origin = groom["head/distance"][:], groom["head/origin"][:]
     return kernels.DistanceField(values, np.asarray(origin, np.float64), float(groom["head/spacing"][0]))
+
+
+def placement(groom: Reader) -> Placement:
+    """Where the head of groom.h5 stands; without one, where the built-in head would."""
+    if "head/placement" not in groom:
+        return Placement()
+    scale, *offset = groom["head/placement"][:].tolist()
+    return Placement(scale, (offset[0], offset[1], offset[2]))
 
 
 def body_frames(groom: Reader) -> BodyFrames | None:

@@ -25,6 +25,7 @@ _READS: dict[str, tuple[str, ...]] = {
         "scene.body",
         "scene.unit_scale",
         "scene.up_axis",
+        "scene.face_axis",
         "scene.skin",
         "groom",
         "simulate.contact.offset",

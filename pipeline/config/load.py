@@ -26,6 +26,7 @@ FILES: dict[
     ("groom", "source"): ("procedural", "swatch"),
     ("groom", "pins"): (),
     ("groom", "partings", "*", "file"): (),
+    ("groom", "scalp", "map"): (),
     ("groom", "style", "*", "*", "map"): (),
     ("simulate", "motion", "file"): (),
     ("simulate", "tips_file"): (),

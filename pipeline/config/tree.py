@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.config.schema.partings import LINES
+from pipeline.config.schema.scalp import REGIONS
 from pipeline.config.schema.varying import KINDS
 
 KeyPath = tuple[str | int, ...]
@@ -43,7 +44,7 @@ class Tree:
     def update(self, other: "Tree") -> None:
         """Lay another tree over this one: tables of one kind merge, everything else is replaced whole.
 
-        A table's kind is its `op`, and which of `KINDS` or of `LINES` it has: an operator that becomes another one keeps its name
+        A table's kind is its `op`, and which of `KINDS`, `LINES` or `REGIONS` it has: an operator that becomes another one keeps its name
         and its place, but none of its options.
         """
         self._merge(self.values, other.values, ())
@@ -96,7 +97,7 @@ def _alike(mine: dict[str, Any], theirs: dict[str, Any]) -> bool:
     """Whether a table only changes values of another one, and does not put another kind of thing in its place."""
     if "op" in theirs and theirs["op"] != mine.get("op", theirs["op"]):
         return False
-    for names in (KINDS, LINES):
+    for names in (KINDS, LINES, REGIONS):
         one, other = ({name for name in names if name in table} for table in (mine, theirs))
         if one and other and one != other:
             return False

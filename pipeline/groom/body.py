@@ -39,9 +39,8 @@ def body_frames(config: Config, head: Head) -> Iterator[BodyFrame]:
         return
     skull = head.skin.points[:, 1] > head.skin.points[:, 1].max() - _SKULL * head.scale
     files = numbered_files(Path(scene.body))
-    for path, points in zip(
-        files, load_poses(Path(scene.head), files, scene.unit_scale, scene.up_axis), strict=True
-    ):
+    poses = load_poses(Path(scene.head), files, scene.unit_scale, scene.up_axis, scene.face_axis)
+    for path, points in zip(files, poses, strict=True):
         pose = rigid_part(head.skin.points[skull], points[skull])
         skin = (points - pose[:3, 3]) @ pose[:3, :3]
         farthest = float(np.linalg.norm(skin - head.skin.points, axis=1).max())

@@ -1,6 +1,6 @@
 """The head that hair grows on: the built-in mannequin or a mesh, with one scalp chart for both.
 
-A mesh's skull is fitted to the mannequin's by crown, breadth and depth (one scale, one offset); the mannequin's
+The mannequin's skull is laid onto a mesh's by one scale and one offset (`fit`); the mannequin's
 hairline, parting and cut heights then hold on it. Grooming happens in these fitted coordinates.
 """
 
@@ -17,17 +17,19 @@ from numpy.typing import NDArray
 from pipeline import kernels
 from pipeline.body.distance import Grid
 from pipeline.body.normals import point_normals
+from pipeline.body.placement import Placement
 from pipeline.config.schema import Config
 from pipeline.errors import InputError
+from pipeline.groom.axes import file_axis
+from pipeline.groom.fit import better_turned, fit_skull
 from pipeline.groom.head import scalp
-from pipeline.groom.head_field import Field, distance_grid
+from pipeline.groom.head_field import Field
+from pipeline.groom.region import Region
+from pipeline.progress import say
 from pipeline.strands.chart import Chart
 
 Points = NDArray[np.floating[Any]]
 Feet = Callable[[Points], tuple[Points, Points]]
-
-# The mannequin's skull [m]: what a mesh is fitted to.
-_CROWN, _BREADTH, _OCCIPUT, _TOP = 0.131, 0.158, -0.0876, 0.075
 
 _SMALLEST, _LARGEST = 0.05, 3.0  # [m] from end to end of a mesh; the largest are whole bodies
 _STUBBLE = 0.7  # part of the scalp's colour that roots hide
@@ -62,6 +64,12 @@ class Head:
     """Pulls points (N, 3) near the skin onto it and tells the normals there; fitted coordinates."""
     arrays: Mapping[str, NDArray[np.float32]] = default(default_factory=dict)
     """Painted numbers (V,) on the points of the skin, by name."""
+    texture: NDArray[np.float32] | None = None
+    """(T, 3, 2) texture coordinates of the corners of its triangles, if it has any."""
+    closest: kernels.MeshDistance | None = None
+    """Finds the triangles of the skin that are nearest to points, world; for paint and texture coordinates."""
+    region: Region = default(default_factory=Region)
+    """Where hair grows."""
 
     @cached_property
     def fitted_field(self) -> Field:
@@ -83,29 +91,43 @@ class Head:
         return scalp.on_skin(self.fitted_field, uv)
 
     def density(self, p: Points) -> Points:
-        """Relative density of roots at fitted points on the skin."""
-        return scalp.density(p)
+        """Relative density of roots at fitted points on the skin; see `Region.density`."""
+        return self.region.density(self, p)
 
-    def uv(self, p: Points) -> Points:
-        """Texture coordinates (N, 2), 0 to 1, of fitted points on the skin: the scalp chart."""
-        return np.asarray(0.5 + 0.5 * self.fitted_chart.uv(p))
+    def uv(self, p: Points) -> NDArray[np.float64]:
+        """Texture coordinates (N, 2) of fitted points on the skin: the mesh's, or the scalp chart from 0 to 1."""
+        if self.texture is None:
+            return np.asarray(0.5 + 0.5 * self.fitted_chart.uv(p))
+        triangle, weight = self._feet(p)
+        return np.asarray(np.einsum("nk,nki->ni", weight, self.texture[triangle]), np.float64)
 
     def array(self, name: str, p: Points) -> NDArray[np.float64]:
         """A painted array at fitted points (N, 3), linear in the triangle that is nearest to each.
 
         Raises InputError for an array that the mesh does not have.
         """
+        values = self.painted(name)
+        triangle, weight = self._feet(p)
+        return np.asarray((values[self.skin.triangles[triangle]] * weight).sum(axis=1), np.float64)
+
+    def painted(self, name: str) -> NDArray[np.float32]:
+        """A painted array (V,). Raises InputError for one that the mesh does not have, or that is not finite."""
         if name not in self.arrays:
             there = f"it has {', '.join(self.arrays)}" if self.arrays else "it has none"
-            raise InputError(f'scene.head: no painted array "{name}" on this mesh; {there}')
-        triangle, weight = self._mesh.feet(np.ascontiguousarray(self.to_world(p), np.float64))
-        corner = self.skin.triangles[triangle]
-        return np.asarray((self.arrays[name][corner] * weight).sum(axis=1), np.float64)
+            raise InputError(
+                f'scene.head: no painted array "{name}" on the points of this mesh; {there} '
+                "(PLY, VTP and what meshio reads can hold them)"
+            )
+        if not np.isfinite(self.arrays[name]).all():
+            raise InputError(
+                f'scene.head: the painted array "{name}" is not finite everywhere; paint it again'
+            )
+        return self.arrays[name]
 
-    @cached_property
-    def _mesh(self) -> kernels.MeshDistance:
-        grid = Grid.around(self.skin.points, self.field.spacing)
-        return grid.measure(self.skin.points, self.skin.triangles)
+    def _feet(self, p: Points) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """The triangle nearest to each fitted point (N, 3), and the weights (N, 3) of its corners there."""
+        assert self.closest is not None
+        return self.closest.feet(np.ascontiguousarray(self.to_world(p), np.float64))
 
     def to_world(self, p: Points) -> Points:
         """Fitted coordinates to world coordinates."""
@@ -116,25 +138,25 @@ def make_head(config: Config) -> Head | None:
     """The head of a config; None for "none". Raises InputError for a mesh that cannot serve."""
     if config.scene.head == "none":
         return None
-    if config.scene.head == "builtin":
-        head = _mannequin(config.simulate.contact.spacing, config.scene.skin)
-    else:
-        head = _from_mesh(config)
+    head = _mannequin(config) if config.scene.head == "builtin" else _from_mesh(config)
     if config.groom.source == "procedural":
         _darken_scalp(head)
     return head
 
 
-def _mannequin(spacing: float, tone: str) -> Head:
+def _mannequin(config: Config) -> Head:
     from pipeline.groom.head import distance, skin, surface
 
     points, triangles, normals = surface.contour()
+    field, closest = _measured(points, triangles, config)
     return Head(
-        skin=Skin(points, triangles, normals, skin.albedo(points, normals, tone)),
-        field=distance_grid(points, triangles, spacing),
+        skin=Skin(points, triangles, normals, skin.albedo(points, normals, config.scene.skin)),
+        field=field,
+        closest=closest,
         scale=1.0,
         offset=np.zeros(3),
         project=lambda p: distance.foot(p, steps=1, reach=surface.REACH),
+        region=Region(config.groom.scalp),
     )
 
 
@@ -144,7 +166,8 @@ def _from_mesh(config: Config) -> Head:
     from pipeline.groom.head_mesh import load_mesh
 
     scene = config.scene
-    points, triangles = load_mesh(Path(scene.head), scene.unit_scale, scene.up_axis)
+    mesh = load_mesh(Path(scene.head), scene.unit_scale, scene.up_axis, scene.face_axis)
+    points, triangles = mesh.points, mesh.triangles
     largest = float(np.ptp(points, axis=0).max())
     if not _SMALLEST < largest < _LARGEST:
         raise InputError(
@@ -153,29 +176,58 @@ def _from_mesh(config: Config) -> Head:
         )
     normals = point_normals(points, triangles).astype(np.float32)
     tone = srgb_to_linear(np.array(load_table()["skin"][scene.skin]))
-    field = distance_grid(points, triangles, config.simulate.contact.spacing)
-    scale, offset = fit_skull(points)
-    fitted = field.rescaled(scale, offset)
+    field, closest = _measured(points, triangles, config)
+    region = Region(config.groom.scalp)
+    placement = _fitted(config, points, field, region)
+    scale, offset = placement.scale, np.array(placement.offset)
     albedo = np.tile(tone, (len(points), 1)).astype(np.float32)
-    return Head(Skin(points, triangles, normals, albedo), field, scale, offset, _grid_feet(fitted))
+    return Head(
+        skin=Skin(points, triangles, normals, albedo),
+        field=field,
+        closest=closest,
+        scale=scale,
+        offset=offset,
+        project=_grid_feet(field.rescaled(scale, offset)),
+        arrays=mesh.arrays,
+        texture=mesh.uv,
+        region=region,
+    )
+
+
+def _measured(
+    points: Points, triangles: NDArray[np.integer], config: Config
+) -> tuple[Field, kernels.MeshDistance]:
+    grid = Grid.around(points, config.simulate.contact.spacing)
+    closest = grid.measure(points, triangles)
+    return Field(closest.values, grid.origin, grid.spacing), closest
+
+
+def _fitted(config: Config, points: Points, field: Field, region: Region) -> Placement:
+    """Where the mannequin lies in a mesh; a mesh that looks another way is refused, or told of."""
+    scene = config.scene
+    fit = fit_skull(points, field)
+    say(
+        "groom",
+        f"the skull is {fit.placement.scale:.2f} of the built-in head's, and fits it within {1e3 * fit.apart:.1f} mm",
+    )
+    turn = better_turned(points, field, fit)
+    if turn is not None:
+        up, face = (file_axis(turn[k], scene.up_axis, scene.face_axis) for k in (1, 2))
+        told = (
+            f'{scene.head}: this head seems to look along "{face}" of its file with "{up}" up; '
+            f'set scene.up_axis = "{up}" and scene.face_axis = "{face}"'
+            + (", after turning it over" if up[0] == "-" else "")
+        )
+        if config.groom.source == "procedural" and region.automatic:
+            raise InputError(f"{told}, or say where hair grows by groom.scalp")
+        say("groom", told)
+    return fit.placement
 
 
 def _darken_scalp(head: Head) -> None:
     """Roots and stubble between the strands, which no strand stands for."""
     covered = head.density((head.skin.points - head.offset) / head.scale)
     head.skin.albedo[:] *= (1 - _STUBBLE * covered)[:, None]
-
-
-def fit_skull(points: Points) -> tuple[float, NDArray[np.float64]]:
-    """Scale and offset (3,) that lay the mannequin's skull onto a mesh's: same crown, breadth and occiput."""
-    p = np.asarray(points, np.float64)
-    crown = p[:, 1].max()
-    scale = 1.0
-    for _ in range(20):
-        top = p[p[:, 1] > crown - _TOP * scale]
-        scale = float(np.ptp(top[:, 0])) / _BREADTH
-    middle = 0.5 * (top[:, 0].min() + top[:, 0].max())
-    return scale, np.array([middle, crown - _CROWN * scale, top[:, 2].min() - _OCCIPUT * scale])
 
 
 def _grid_feet(field: Field) -> Feet:

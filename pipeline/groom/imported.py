@@ -37,7 +37,7 @@ def load(config: Config, head: Head | None) -> tuple[Strands, dict[str, Any]]:
     groom, path = config.groom, Path(config.groom.source)
     file = read_groom(path)
     repairs = Repairs()
-    metric = in_metres(file, groom.unit_scale, groom.up_axis)
+    metric = in_metres(file, groom.unit_scale, groom.up_axis, groom.face_axis)
     kept, index = cleaned(metric, repairs)
     if not len(kept):
         raise InputError(
@@ -61,10 +61,12 @@ def load(config: Config, head: Head | None) -> tuple[Strands, dict[str, Any]]:
     return _strands(config, points[order], held[order], head), report
 
 
-def in_metres(file: Ragged, unit_scale: float | None, up_axis: str | None) -> Ragged:
+def in_metres(
+    file: Ragged, unit_scale: float | None, up_axis: str | None, face_axis: str | None = None
+) -> Ragged:
     """The strands of a file in metres with y up: as told, else as the file says, else in metres and upright already."""
     scale = unit_scale or file.metres or 1.0
-    points = upright(file.points * scale, up_axis or file.up_axis or "y")
+    points = upright(file.points * scale, up_axis or file.up_axis or "y", face_axis)
     widths = None if file.widths is None else file.widths * np.float32(scale)
     return Ragged(points, file.counts, file.pins, widths)
 

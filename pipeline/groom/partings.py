@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.schema import Config, Parting
 from pipeline.errors import InputError
+from pipeline.groom.head import scalp
 from pipeline.groom.head.distance import smoothstep
 from pipeline.groom.heads import Head
 from pipeline.strands.chart import Chart
@@ -40,7 +41,8 @@ def partings_of(config: Config, head: Head | None) -> Partings:
         return Partings(chart, tuple(_flat_line(name, parting, chart) for name, parting in named.items()))
     lines = tuple(_line(name, parting, head) for name, parting in named.items())
     for name, line in zip(named, lines, strict=True):
-        if not head.density(head.on_skin(refined(line, 0.01))).any():
+        skin = head.on_skin(refined(line, 0.01))
+        if not (scalp.density(skin).any() or head.density(skin).any()):
             raise InputError(
                 f"groom.partings.{name}: no part of it lies where hair grows; move its corners onto the scalp"
             )

@@ -46,7 +46,7 @@ class Style:
         combing = comb(head, self.partings)
         self.terrain = Terrain(skin, skin.guarded(), combing)
         density = partial(_density, head, combing)
-        found, _ = place_roots(self.groom.strands, self.seed, skin, density)
+        found, _ = place_roots(self.groom.strands, self.seed, skin, density, head.region)
         self.roots, self.normals = (np.asarray(a, np.float64) for a in head.project(found))
         placed = head.to_world(self.roots).astype(np.float32).astype(np.float64)  # as stages will see them
         ground = Ground(self.seed, self.groom.points, self.terrain, head)

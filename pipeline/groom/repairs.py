@@ -18,6 +18,7 @@ SHORTEST, LONGEST = 1e-3, 10.0  # [m] strands below have no shape, and those abo
 _REPEATED = 1e-6  # of a strand's length: points this near are one
 _TURNED = 0.01  # [m] how much farther than its tip a root may be from the head
 _CLEARANCE = 0.8e-3  # [m] between strands and skin
+_ROUNDS = 16  # of pushing: at the sharp edge of a bust both sides push
 
 
 @dataclass
@@ -109,7 +110,7 @@ def pushed_out(points: NDArray[np.float64], skin: Field) -> tuple[NDArray[np.flo
     rows = np.arange(len(points))
     clearance = np.full(points.shape[1], _CLEARANCE)
     clearance[:2] = -np.inf
-    for _ in range(4):  # equal spacing moves points back a little
+    for _ in range(_ROUNDS):  # equal spacing moves points back a little
         moved, depth = skin.outside(points[rows], clearance, rounds=1)
         through[rows] |= depth > _CLEARANCE
         rows, moved = rows[depth > 0], moved[depth > 0]

@@ -13,26 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
-from pipeline.errors import InputError
 from pipeline.groom.head import scalp
 from pipeline.groom.head_field import Field
+from pipeline.groom.region import Region
 from pipeline.strands.random import uniform
 
 Points = NDArray[np.floating[Any]]
 
 _PLASTIC = 1.32471795724474602596  # the root of x^3 = x + 1
-_DISC = 0.9  # chart radius that holds the scalp
-_HIGHEST = 0.024  # [m^2] bound of density r^2 / cos
 _BATCH = 1 << 17
 _SALT = 1
 
 
 def place_roots(
-    count: int, seed: int, skin: Field, density: Callable[[Points], Points]
+    count: int, seed: int, skin: Field, density: Callable[[Points], Points], region: Region
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The first `count` roots (S, 3) [m] on the skin and its unit normals there, in fitted coordinates.
 
-    Raises InputError when almost no candidate lands on the scalp.
+    `density` is that of the region, or less, or somewhat more. Raises InputError when almost no candidate lands there.
     """
     found: list[NDArray[np.float64]] = []
     first = total = 0
@@ -40,13 +38,13 @@ def place_roots(
     with ThreadPoolExecutor(kernels.threads()) as pool:
         while total < count:
             begins = first + batch * np.arange(kernels.threads() if batch == _BATCH else 1)
-            parts = [pool.submit(_candidates, k + np.arange(batch), seed, skin, density) for k in begins]
+            parts = [
+                pool.submit(_candidates, k + np.arange(batch), seed, skin, density, region) for k in begins
+            ]
             found.extend(part.result() for part in parts)
             first, total = int(begins[-1]) + batch, sum(len(p) for p in found)
             if first > 10_000 and total < first / 10_000:
-                raise InputError(
-                    "scene.head: found no scalp on this mesh; check scene.up_axis and scene.unit_scale"
-                )
+                raise region.nothing()
     roots = np.concatenate(found)[:count]
     for _ in range(2):
         d, n = skin.sample(roots)
@@ -55,13 +53,13 @@ def place_roots(
 
 
 def _candidates(
-    index: NDArray[np.int64], seed: int, skin: Field, density: Callable[[Points], Points]
+    index: NDArray[np.int64], seed: int, skin: Field, density: Callable[[Points], Points], region: Region
 ) -> NDArray[np.float64]:
     uv = 2 * ((0.5 + index[:, None] * np.array([1 / _PLASTIC, 1 / _PLASTIC**2])) % 1) - 1
     inside = (uv**2).sum(1) < 1
-    index, p = index[inside], scalp.on_skin(skin, _DISC * uv[inside])
+    index, p = index[inside], scalp.on_skin(skin, region.disc * uv[inside])
     ray = p - scalp.chart().center
     squares = (ray**2).sum(1)
     cosine = np.maximum((skin.sample(p)[1] * ray).sum(1) / np.sqrt(squares), 0.43)
-    kept = uniform(seed, index, _SALT) < density(p) * squares / cosine / _HIGHEST
+    kept = uniform(seed, index, _SALT) < density(p) * squares / cosine / region.highest
     return np.asarray(p[kept])

@@ -8,6 +8,7 @@ partings/...                       lines of the scalp that hair does not blend a
 guides/strand (G,) u32             which strands are simulated, ascending
 guides/offset (G, P) f32 [m]       distance that their points keep from the skin
 head/points, triangles, normals, albedo, distance, origin, spacing     unless scene.head = "none"
+head/placement (4,) f64            scale and offset [m] that lay the built-in head onto it
 body/points (F, V, 3) f32 [m], pose (F, 4, 4)     the head in motion, where there is scene.body (see body.py)
 """
 
@@ -167,6 +168,7 @@ def _write_head(writer: cache.Writer, head: Head) -> None:
     writer.write("head/distance", head.field.values)
     writer.write("head/origin", head.field.origin)
     writer.write("head/spacing", np.array([head.field.spacing]))
+    writer.write("head/placement", np.array([head.scale, *head.offset]))
 
 
 def _write_body(writer: cache.Writer, frames: Iterable[BodyFrame]) -> None:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
-from pipeline.config.schema import Camera
 from pipeline.render.geometry import smooth
 from pipeline.render.target import DECODED, Target
+from pipeline.render.view import View
 
 Points = NDArray[np.float32]
 Which = NDArray[np.uint32]
@@ -31,7 +31,7 @@ _LAYERS_MOST = 33.0
 class Coverage:
     """One frame: `count` all strands, then `draw` them over the target."""
 
-    def __init__(self, target: Target, size: tuple[int, int], camera: Camera, pixels: float) -> None:
+    def __init__(self, target: Target, size: tuple[int, int], camera: View, pixels: float) -> None:
         """Start a frame of `size` [px] with strands about `pixels` wide; the target has been cleared for it."""
         self._target, self._size = target, size
         scale = size[1] / 2 / np.tan(camera.field_of_view / 2)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
+from pipeline.body.placement import Placement
 from pipeline.config.schema import Config
 from pipeline.render.coverage import Coverage
 from pipeline.render.geometry import (
@@ -21,6 +22,7 @@ from pipeline.render.geometry import (
 from pipeline.render.lighting import Lighting
 from pipeline.render.target import Target
 from pipeline.render.tone import average, before_roll_off, develop
+from pipeline.render.view import View
 from pipeline.strands.expand import Expansion, MovedSkin
 from pipeline.strands.random import normal
 
@@ -65,13 +67,18 @@ class FrameRenderer:
     """Renders moments of one experiment into one framebuffer."""
 
     def __init__(
-        self, config: Config, strands: Expansion, key: NDArray[np.uint32], skin: Skin | None = None
+        self,
+        config: Config,
+        strands: Expansion,
+        key: NDArray[np.uint32],
+        skin: Skin | None = None,
+        head: Placement | None = None,
     ) -> None:
         """Prepare for strands with random keys (N,). Raises InputError when there is no off-screen OpenGL."""
         render, scene = config.render, config.scene
-        self.render, self.camera = render, scene.camera
+        self.render, self.camera = render, View.of(scene.camera, head or Placement())
         self.strands, self.key, self.skin = strands, key, skin
-        self.eye = np.array(scene.camera.position, np.float64)
+        self.eye = self.camera.position
         self.count = min(render.strands or strands.count, strands.count)
         self.width = drawn_width(render, self.count, strands.count)
         spread = np.clip(normal(config.seed, key, _MELANIN), -2, 2)

@@ -5,7 +5,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.schema import Camera, Render
+from pipeline.config.schema import Render
+from pipeline.render.view import View
 
 Points = NDArray[np.float32]
 Shape = Literal["tubes", "ribbons", "lines", "coverage"]
@@ -29,7 +30,7 @@ def drawn_width(render: Render, strands: int, of: int | None = None) -> float:
     return width * of / strands
 
 
-def projected_width(render: Render, camera: Camera, width: float, middle: NDArray[np.float64]) -> float:
+def projected_width(render: Render, camera: View, width: float, middle: NDArray[np.float64]) -> float:
     """Width [px] of a strand of `width` [m] that passes through `middle` (3,) [m]."""
     forward = np.subtract(camera.look_at, camera.position)
     depth = float((middle - camera.position) @ forward / np.linalg.norm(forward))

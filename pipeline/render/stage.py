@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from pipeline import cache, kernels
-from pipeline.cache.expansion import body_frames, distance_field, expansion_from
+from pipeline.cache.expansion import body_frames, distance_field, expansion_from, placement
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.render.body import DrawnBody
@@ -33,9 +33,9 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
     with cache.open(experiment.groom, "groom") as groom, cache.open(experiment.strands, "strands") as strands:
         expansion = expansion_from(groom, strands, config)
         keys = strands["strands/key"][:]
-        skin, moving = _skin(groom), body_frames(groom)
+        skin, moving, head = _skin(groom), body_frames(groom), placement(groom)
         body = DrawnBody(moving, skin, strands["strands/root"][:]) if moving and skin else None
-    renderer = FrameRenderer(config, expansion, keys, skin)
+    renderer = FrameRenderer(config, expansion, keys, skin, head)
     record = provenance(config, "render")
     texts = {"config": config.name}
     shape = ""

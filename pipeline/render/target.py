@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.schema import Camera
 from pipeline.errors import InputError
+from pipeline.render.view import View
 
 Colours = NDArray[np.float32]
 Points = NDArray[np.float32]
@@ -54,7 +54,7 @@ class Target:
         self._renderer.AddActor(self._actor)
         self._kept: list[Any] = []
 
-    def clear(self, camera: Camera, near: float, far: float) -> None:
+    def clear(self, camera: View, near: float, far: float) -> None:
         """Start a picture; what lies between the distances `near` and `far` [m] from the camera is drawn."""
         view = self._renderer.GetActiveCamera()
         view.SetPosition(*camera.position)

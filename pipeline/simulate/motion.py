@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.body.placement import Placement
 from pipeline.cache.transforms import read_transforms
 from pipeline.config.schema import Keyframe, Motion, Simulate
 from pipeline.errors import InputError
@@ -33,6 +34,7 @@ Signal = Callable[[float], float]
 Poses = Callable[[float], Pose]
 
 _AXES = {"nod": (1.0, 0.0, 0.0), "shake": (0.0, 1.0, 0.0), "turn": (0.0, 1.0, 0.0)}
+_NECK = (0.0, -0.05, -0.015)  # [m] on the built-in head: what a head turns about unless it is told
 _HALF_TURN = np.radians(170)  # from sample to sample: beyond it one cannot tell which way round
 _SOON = 1e-6  # [s] times this near are one
 
@@ -88,19 +90,20 @@ def preset_angle(motion: Motion) -> Signal:
     return turn if motion.preset == "turn" else swing
 
 
-def head_motion(motion: Motion, fps: float = 24.0) -> HeadMotion:
+def head_motion(motion: Motion, fps: float = 24.0, head: Placement | None = None) -> HeadMotion:
     """The head's motion; `fps` counts the frames of a file and of jumps. Raises InputError for a file that fails."""
+    pivot = np.array(motion.pivot) if motion.pivot is not None else (head or Placement()).world(_NECK)
     if motion.file is not None:
-        return _track(motion, Path(motion.file), fps)
+        return _track(motion, Path(motion.file), pivot, fps)
     if motion.keyframes:
-        return _keyed(motion, fps)
+        return _keyed(motion, pivot, fps)
     if motion.preset == "none":
         return HeadMotion((-np.inf,), (lambda _: np.eye(4),))
-    pivot, axis, angle = np.array(motion.pivot), np.array(_AXES[motion.preset]), preset_angle(motion)
+    axis, angle = np.array(_AXES[motion.preset]), preset_angle(motion)
     return HeadMotion((-np.inf,), (lambda time: rigid(axis * angle(time), np.zeros(3), pivot),))
 
 
-def _keyed(motion: Motion, fps: float) -> HeadMotion:
+def _keyed(motion: Motion, pivot: Vector, fps: float) -> HeadMotion:
     jumps = [(frame - 1) / fps for frame in sorted(motion.teleport)]
     groups = [
         [key for key in motion.keyframes if after - _SOON <= key.time < before - _SOON]
@@ -108,7 +111,6 @@ def _keyed(motion: Motion, fps: float) -> HeadMotion:
     ]
     if not all(groups):
         raise InputError("simulate.motion.teleport: no keyframe between two jumps; each needs one after it")
-    pivot = np.array(motion.pivot)
     return HeadMotion((-np.inf, *jumps), tuple(keyed_path(keys, pivot) for keys in groups))
 
 
@@ -125,11 +127,11 @@ def keyed_path(keyframes: Sequence[Keyframe], pivot: Vector) -> Poses:
     return pose
 
 
-def _track(motion: Motion, path: Path, fps: float) -> HeadMotion:
+def _track(motion: Motion, path: Path, pivot: Vector, fps: float) -> HeadMotion:
     times, poses = read_transforms(path, fps, motion.unit_scale)
     jumps = [(frame - 1) / fps for frame in motion.teleport]
     if motion.teleport_beyond is not None:
-        pivots = poses[:, :3, :3] @ np.array(motion.pivot) + poses[:, :3, 3]
+        pivots = poses[:, :3, :3] @ pivot + poses[:, :3, 3]
         far = np.linalg.norm(np.diff(pivots, axis=0), axis=1) > motion.teleport_beyond
         jumps += times[1:][far].tolist()
     starts = [float(times[0]), *sorted({time for time in jumps if times[0] < time <= times[-1]})]

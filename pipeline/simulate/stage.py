@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import cache
-from pipeline.cache.expansion import body_frames, distance_field
+from pipeline.cache.expansion import body_frames, distance_field, placement
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.simulate.diagnostics import draw, lines
@@ -63,6 +63,7 @@ def read_guides(experiment: cache.Experiment) -> tuple[Guides, NDArray[np.uint32
             offset=groom["guides/offset"][:],
             field=distance_field(groom),
             body=body_frames(groom),
+            head=placement(groom),
             strands=len(groom["strands/points"]),
         )
     return guides, strand

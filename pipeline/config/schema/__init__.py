@@ -13,6 +13,7 @@ from pipeline.config.schema.hair_contact import HairContact
 from pipeline.config.schema.interpolate import Interpolate, Variation
 from pipeline.config.schema.partings import Parting
 from pipeline.config.schema.render import Fibre, Render
+from pipeline.config.schema.scalp import Plane, Scalp
 from pipeline.config.schema.scene import Camera, Light, Scene
 from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, SagFree, Simulate
 from pipeline.config.schema.style import (
@@ -59,8 +60,10 @@ __all__ = [
     "Motion",
     "Operator",
     "Parting",
+    "Plane",
     "Render",
     "SagFree",
+    "Scalp",
     "Scene",
     "Section",
     "Simulate",

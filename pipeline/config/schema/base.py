@@ -3,13 +3,14 @@
 Values are SI; see `units` for the strings that are accepted.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from pipeline.config.units import Length, Speed
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
+FaceAxis = Literal["x", "-x", "y", "-y", "z", "-z"]
 Vector = tuple[float, float, float]
 Position = tuple[Length, Length, Length]
 Velocity = tuple[Speed, Speed, Speed]

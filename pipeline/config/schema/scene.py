@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.config.schema.base import Colour, Position, Section, Vector
+from pipeline.config.schema.base import Colour, FaceAxis, Position, Section, Vector
 from pipeline.config.units import Angle
 
 
@@ -18,10 +18,10 @@ class Light(Section):
 
 
 class Camera(Section):
-    position: Position = (0.40, 0.02, 0.80)
-    """Where the camera stands [m]."""
-    look_at: Position = (0.0, -0.03, 0.0)
-    """The point in the middle of the picture [m]."""
+    position: Position | None = None
+    """Where the camera stands [m]; unset, at (0.40, 0.02, 0.80) from the built-in head, and likewise from any other."""
+    look_at: Position | None = None
+    """The point in the middle of the picture [m]; unset, (0, -0.03, 0) of the built-in head, and likewise of any other."""
     up: Vector = (0.0, 1.0, 0.0)
     """The direction that is up in the picture."""
     field_of_view: Annotated[Angle, Field(gt=0, lt=3)] = 0.4886921905584123
@@ -37,6 +37,8 @@ class Scene(Section):
     """Metres per unit of the head's mesh file (0.01 for centimetres)."""
     up_axis: Literal["x", "y", "z"] = "y"
     """Which axis of the head's mesh file points up."""
+    face_axis: FaceAxis | None = None
+    """Which axis of that file the face looks along; unset, z, or -y where z is up."""
     skin: Literal["mannequin", "fair", "tan", "deep"] = "mannequin"
     """Tone of the skin."""
     background: Colour = (0.2, 0.2, 0.2)
@@ -51,6 +53,12 @@ class Scene(Section):
     """Directional lights: key, fill and rim by default."""
     camera: Camera = Camera()
     """The camera."""
+
+    @model_validator(mode="after")
+    def _faces_ahead(self) -> "Scene":
+        if self.face_axis is not None and self.face_axis[-1] == self.up_axis:
+            raise ValueError(f'a face that looks along "{self.face_axis}" cannot have "{self.up_axis}" up')
+        return self
 
     @model_validator(mode="after")
     def _body_fits_head(self) -> "Scene":

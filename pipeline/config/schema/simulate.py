@@ -80,8 +80,8 @@ class Motion(Section):
     """Duration of one swing of a preset."""
     swings: Annotated[int, Field(ge=1)] = 1
     """Number of swings of a preset; after them the head holds still."""
-    pivot: Position = (0.0, -0.05, -0.015)
-    """The point that the head turns about [m]."""
+    pivot: Position | None = None
+    """The point that the head turns about [m]; unset, (0, -0.05, -0.015) of the built-in head, and likewise of any other."""
     keyframes: Keyframes = ()
     """Poses at times; between them a smooth spline, held before the first and after the last."""
     file: str | None = None

@@ -3,18 +3,16 @@
 import ast
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from pipeline.config.formula import parse
 from pipeline.config.schema import Varied
 from pipeline.errors import InputError
 from pipeline.groom.head.distance import smoothstep
+from pipeline.groom.image import brightness, sampled
 from pipeline.strands.random import hashed, uniform
 
 if TYPE_CHECKING:
@@ -52,7 +50,7 @@ def varied(option: Varied, at: Scalp) -> Values:
         with np.errstate(all="ignore"):
             value = np.broadcast_to(_evaluated(parse(option.formula), at), len(at.index)).astype(float)
     elif option.map is not None:
-        value = _looked_up(_image(option.map), np.asarray(at.head.uv(at.root), np.float64))
+        value = sampled(brightness(option.map), at.head.uv(at.root))
     else:
         value = at.head.array(option.array or "", at.root)
     if not np.isfinite(value).all():
@@ -96,30 +94,6 @@ def noise(points: Values, scale: Values | float, seed: int) -> Values:
         weight = np.prod(np.where(corner, part, 1 - part), axis=1)
         total += weight * (mixed / 2.0**31 - 1)
     return total
-
-
-@lru_cache(maxsize=16)
-def _image(path: str) -> Values:
-    """Brightness (H, W) of an image, 0 to 1. Raises InputError for a file that is none."""
-    try:
-        with Image.open(Path(path)) as image:
-            deep = image.mode.startswith("I")
-            values = np.asarray(image if deep else image.convert("L"), np.float64)
-    except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(f"groom.style: map {path}: cannot be read as an image ({error})") from None
-    return values / (65535.0 if deep else 255.0)
-
-
-def _looked_up(image: Values, uv: Values) -> Values:
-    """Bilinear samples (N,) at texture coordinates (N, 2): u to the right, v upwards from the lower left corner."""
-    high, wide = image.shape
-    x = np.clip(uv[:, 0] * wide - 0.5, 0, wide - 1)
-    y = np.clip((1 - uv[:, 1]) * high - 0.5, 0, high - 1)
-    i, j = (np.minimum(a.astype(np.int64), max(n - 2, 0)) for a, n in ((y, high), (x, wide)))
-    a, b = y - i, x - j
-    lower, right = np.minimum(i + 1, high - 1), np.minimum(j + 1, wide - 1)
-    top = image[i, j] * (1 - b) + image[i, right] * b
-    return np.asarray(top * (1 - a) + (image[lower, j] * (1 - b) + image[lower, right] * b) * a)
 
 
 def _smoothstep(a: Values, b: Values, x: Values) -> Values:
