@@ -25,6 +25,9 @@ template <class Real> struct Outside {
         : force(arena.take<Vec3<Real>>(P)), push(arena.take<Vec3<Real>>(P)),
           rate(arena.take<Lanes<Real>>(6 * size_t(P))) {}
 
+    /// Bytes that an Outside takes from its arena.
+    static size_t bytes(int P) { return sizeof(Lanes<Real>) * 12 * size_t(P); }
+
     /// C a at point i.
     RINGLET_INLINE Vec3<Real> times_rate(int i, Vec3<Real> a) const {
         const Lanes<Real> *C = rate + 6 * i;

@@ -45,7 +45,8 @@ template <class Real> class Together {
         double looking = 0, acting = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : acting)
         {
-            Arena arena(Stepper<Real>::bytes(rest_.P) + share * Resident<Real>::bytes(rest_.P));
+            Arena arena(Stepper<Real>::bytes(rest_.P) + Outside<Real>::bytes(rest_.P) +
+                        share * Resident<Real>::bytes(rest_.P));
             Stepper<Real> stepper(arena, rest_.P, settings_, field);
             Outside<Real> outside(arena, rest_.P);
             stepper.outside = &outside;
@@ -154,7 +155,7 @@ void neighbour_acceleration(StateArrays<Real> state, const RestShape &rest, Neig
     }
 #pragma omp parallel num_threads(threads)
     {
-        Arena own(Stepper<Real>::bytes(rest.P));
+        Arena own(Outside<Real>::bytes(rest.P));
         Outside<Real> outside(own, rest.P);
         force.look(head);
 #pragma omp for
