@@ -51,7 +51,7 @@ def test_counts_and_masks_say_the_same(tmp_path: Path, kind: str) -> None:
     ("text", "message"),
     [
         ("2,0\n", r"pins of 1 strands; the groom has 2"),
-        ("2,0\n2,x\n", r"pins\.csv:2: not a line of numbers"),
+        ("2,0\n2,x\n", r"pins\.csv:2: not a line of numbers: 2,x; a strand has 2"),
         ("2,0\n2\n", r"pins\.csv:2: 1 numbers; a strand has 2 \(held at root and tip\) or 16"),
         ("2,0\n2,0.5\n", r"pins\.csv:2: pins are whole numbers"),
         ("root tip\n2 0\n-1 0\n", r"pins\.csv:3: a number of held points is negative"),

@@ -51,7 +51,9 @@ def read_table(path: Path, widths: tuple[int, ...], expected: str) -> Table:
             lines.append(number)
         except ValueError:
             if rows or header:
-                raise InputError(f"{path}:{number}: not a line of numbers: {line.strip()[:40]}") from None
+                raise InputError(
+                    f"{path}:{number}: not a line of numbers: {line.strip()[:40]}; {expected}"
+                ) from None
             header = tuple(word.strip("\"'").lower() for word in words)
         if rows and (len(rows[-1]) != len(rows[0]) or len(rows[0]) not in widths):
             raise InputError(f"{path}:{number}: {len(rows[-1])} numbers; {expected}")
