@@ -136,18 +136,20 @@ struct Bins {
             const float W = view.W, H = view.H;
             const int across = view.across();
             const float columns = across - 1, rows = view.down() - 1;
-            const float *x = at.x.data(), *y = at.y.data(), *d = at.d.data(), *h = at.h.data();
-            int *pass = passed.data(), some = 0;
-            for (int j = 0; j + 1 < P; ++j) {
+            const float *__restrict x = at.x.data(), *__restrict y = at.y.data(), *__restrict d = at.d.data();
+            const float *__restrict h = at.h.data(), *__restrict deep = around.data();
+            int *__restrict pass = passed.data(), some = 0;
+#pragma omp simd reduction(| : some)
+            for (int j = 0; j < P - 1; ++j) {
                 const float wide = margin + std::max(h[j], h[j + 1]);
-                const bool inside = (std::max(x[j], x[j + 1]) > -wide) & (std::min(x[j], x[j + 1]) < W + wide) &
+                const int inside = (std::max(x[j], x[j + 1]) > -wide) & (std::min(x[j], x[j + 1]) < W + wide) &
                                     (std::max(y[j], y[j + 1]) > -wide) & (std::min(y[j], y[j + 1]) < H + wide);
                 const int a0 = int(std::min(std::max(x[j] * per_tile, 0.0f), columns));
                 const int a1 = int(std::min(std::max(x[j + 1] * per_tile, 0.0f), columns));
                 const int b0 = int(std::min(std::max(y[j] * per_tile, 0.0f), rows));
                 const int b1 = int(std::min(std::max(y[j + 1] * per_tile, 0.0f), rows));
-                const float deepest = std::max(around[size_t(b0) * across + a0], around[size_t(b1) * across + a1]);
-                const bool far = (a0 - a1 > 2) | (a1 - a0 > 2) | (b0 - b1 > 2) | (b1 - b0 > 2) | (wide > kTile);
+                const float deepest = std::max(deep[b0 * across + a0], deep[b1 * across + a1]);
+                const int far = (a0 - a1 > 2) | (a1 - a0 > 2) | (b0 - b1 > 2) | (b1 - b0 > 2) | (wide > kTile);
                 pass[j] = inside & (far | (std::min(d[j], d[j + 1]) <= deepest));
                 some |= pass[j];
             }

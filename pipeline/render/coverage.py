@@ -21,22 +21,17 @@ Chunks = Callable[[], Iterable[tuple[int, Points]]]
 Shade = Callable[[int, Points, Which], NDArray[np.float32]]
 """Linear RGB (n, 3) of some of the points (n,), flat indices, of a chunk."""
 
-_LAYERS, _LAYERS_PER_PIXEL = (
-    8.0,
-    25.0,
-)  # of hair that hide the rest, for the thinnest strands, and more for wider ones
-_LAYERS_MOST = 33.0
+_LAYERS = 33.0  # of hair that hide the rest: with fewer, more pixels are drawn twice; with more, more is shaded for nothing
 
 
 class Coverage:
     """One frame: `count` all strands, then `draw` them over the target."""
 
-    def __init__(self, target: Target, size: tuple[int, int], camera: View, pixels: float) -> None:
-        """Start a frame of `size` [px] with strands about `pixels` wide; the target has been cleared for it."""
+    def __init__(self, target: Target, size: tuple[int, int], camera: View) -> None:
+        """Start a frame of `size` [px]; the target has been cleared for it."""
         self._target, self._size = target, size
         scale = size[1] / 2 / np.tan(camera.field_of_view / 2)
-        layers = min(_LAYERS + _LAYERS_PER_PIXEL * pixels, _LAYERS_MOST)
-        self._raster = kernels.Raster(size, target.matrix(), scale, target.planes(), layers)
+        self._raster = kernels.Raster(size, target.matrix(), scale, target.planes(), _LAYERS)
 
     def count(self, first: int, points: Points, widths: Points) -> None:
         """Look at strands (S, P, 3) [m] with widths (S, P) [m], which begin with number `first`."""

@@ -104,9 +104,7 @@ class FrameRenderer:
         upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
         self.target.clear(self.camera, *self._depths(self._corners(moment, lower, upper)))
         shape, pixels = self.shape(moment)
-        coverage = (
-            Coverage(self.target, self.render.size, self.camera, pixels) if shape == "coverage" else None
-        )
+        coverage = Coverage(self.target, self.render.size, self.camera) if shape == "coverage" else None
         kept = self._light(moment, lower, upper, coverage)
         self._draw_head(moment)
         if coverage is not None:
