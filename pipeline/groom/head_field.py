@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
-from pipeline.body.distance import Grid
 
 Points = NDArray[np.floating[Any]]
 Vectors = NDArray[np.float64]
@@ -83,9 +82,3 @@ class Field:
         k0 = np.sqrt(x**2 + y**2 + z**2) + 1e-6
         k1 = np.sqrt((x / radii[0]) ** 2 + (y / radii[1]) ** 2 + (z / radii[2]) ** 2)
         return np.asarray(k0 * (k0 - 1) / (k1 + 1e-6), np.float32)
-
-
-def distance_grid(points: Points, triangles: NDArray[np.integer], spacing: float) -> Field:
-    """Signed distance on a grid around the mesh; `points` (V, 3) [m], `triangles` (T, 3) closed, wound outwards."""
-    grid = Grid.around(points, spacing)
-    return Field(grid.measure(points, triangles).values, grid.origin, spacing)

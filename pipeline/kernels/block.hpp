@@ -153,22 +153,28 @@ template <class Real> struct BlockIndex {
 
 template <class Real> int block_count(int strands) { return (strands + kLanes<Real> - 1) / kLanes<Real>; }
 
+/// Lanes to `count` numbers of each strand: the first `strands` lanes, to target + strand[lane] * count.
 template <class Real, class T>
-void scatter(const Lanes<Real> *from, T *target, int count, const BlockIndex<Real> &index) {
+void scatter(const Lanes<Real> *from, T *target, int count, const int (&strand)[kLanes<Real>], int strands) {
     constexpr int n = kLanes<Real>;
-    T *to = target + size_t(index.begin) * count;
     for (int first = 0; first < count; first += n) {
         if (count < n) {
-            for (int lane = 0; lane < index.count; ++lane)
-                for (int i = 0; i < count; ++i) to[size_t(lane) * count + i] = T(from[i][lane]);
+            for (int lane = 0; lane < strands; ++lane)
+                for (int i = 0; i < count; ++i) target[size_t(strand[lane]) * count + i] = T(from[i][lane]);
             return;
         }
         const int begin = std::min(first, count - n);
         Lanes<Real> rows[n];
         for (int i = 0; i < n; ++i) rows[i] = from[begin + i];
         transpose<Real>(rows);
-        for (int lane = 0; lane < index.count; ++lane) store_row<Real>(rows[lane], to + size_t(lane) * count + begin);
+        for (int lane = 0; lane < strands; ++lane)
+            store_row<Real>(rows[lane], target + size_t(strand[lane]) * count + begin);
     }
+}
+
+template <class Real, class T>
+void scatter(const Lanes<Real> *from, T *target, int count, const BlockIndex<Real> &index) {
+    scatter<Real>(from, target, count, index.strand, index.count);
 }
 
 template <class Real, class T>

@@ -10,11 +10,11 @@
 // blended; we blend rotations instead of their forces (tests: error against a rod solver, chunks, lengths).
 #pragma once
 
+#include "between.hpp"
 #include "block.hpp"
 #include "distance_field.hpp"
 #include "guide_motion.hpp"
 #include "patches.hpp"
-#include "transpose.hpp"
 #include "vary.hpp"
 
 namespace ringlet {
@@ -181,7 +181,7 @@ struct Expand {
                     row[lane] = strand[lane] - begin;
                 }
                 block(strand, scratch);
-                write_rows(&scratch.x->x, out, 3 * P, row, index.count);
+                scatter<float>(&scratch.x->x, out, 3 * P, row, index.count);
             }
         }
     }
@@ -227,7 +227,7 @@ struct Expand {
             copies.sine[lane] = copy ? std::sin(strands.phase[s]) : 0;
             some |= copy;
         }
-        read_rows(&x->x, rest, 3 * P, parent);
+        gather(x, rest, P, parent);
         for (int j = 0; j + 1 < P; ++j) e[j] = x[j + 1] - x[j], scratch.whole[j] = length(e[j]);
         copies.offset = root - x[0];
         if (some) vary(e, scratch.whole, x, P, copies, style);

@@ -5,17 +5,17 @@ drawn. Then `draw` takes them once more, and again for the few tiles where the g
 """
 
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
-from pipeline.render.geometry import smooth
+from pipeline.render.geometry import Which, smooth, smooth_colours
 from pipeline.render.target import DECODED, Target
 from pipeline.render.view import View
 
 Points = NDArray[np.float32]
-Which = NDArray[np.uint32]
 Chunks = Callable[[], Iterable[tuple[int, Points]]]
 """All strands in chunks: the number of the first, and their points (S, P, 3) [m]; the same each time."""
 Shade = Callable[[int, Points, Which], NDArray[np.float32]]
@@ -49,22 +49,7 @@ class Coverage:
             for first, points in chunks():
                 fine = smooth(points, pieces) if pieces > 1 else points
                 seen = self._raster.add(fine, widths(fine))
-                self._raster.colour(_colours(shade, first, points, pieces, seen))
+                shaded = partial(shade, first, points)
+                self._raster.colour(smooth_colours(shaded, points.shape[1], pieces, seen))
             wrong = self._raster.compose(backdrop, picture)
         return picture
-
-
-def _colours(shade: Shade, first: int, points: Points, pieces: int, seen: Which) -> Points:
-    """Linear RGB (n, 3) of points of the subdivided strands, linear between the points that are shaded."""
-    if pieces == 1:
-        return shade(first, points, seen)
-    count = points.shape[1]
-    strand, place = np.divmod(seen, np.uint32((count - 1) * pieces + 1))
-    segment, part = np.divmod(place, np.uint32(pieces))
-    before = strand * np.uint32(count) + segment
-    after = before + (part > 0)
-    shaded = np.unique(np.concatenate([before, after]))
-    colours = shade(first, points, shaded)
-    a, b = (colours[np.searchsorted(shaded, ends)] for ends in (before, after))
-    t = part.astype(np.float32)[:, None] / np.float32(pieces)
-    return np.asarray(a + t * (b - a))

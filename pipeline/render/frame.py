@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from pipeline.render.geometry import (
     projected_width,
     ribbons,
     smooth,
+    smooth_colours,
     taper,
 )
 from pipeline.render.lighting import Lighting
@@ -164,20 +166,17 @@ class FrameRenderer:
         seen = np.flatnonzero(visible.any(axis=1))
         if len(seen) == 0:
             return
-        segments = visible[seen, :-1] | visible[seen, 1:]
-        wanted = np.zeros((len(seen), points.shape[1]), bool)
+        pieces, own = self.render.subdivide, first + seen
+        shaded = np.ascontiguousarray(points[seen])
+        points = smooth(shaded, pieces) if pieces > 1 else shaded
+        segments = np.repeat(visible[seen, :-1] | visible[seen, 1:], pieces, axis=1)
+        wanted = np.zeros(points.shape[:2], bool)
         wanted[:, :-1] |= segments
         wanted[:, 1:] |= segments
-        own, points = first + seen, np.ascontiguousarray(points[seen])
-        colours = np.zeros_like(points)
         which = np.flatnonzero(wanted).astype(np.uint32)
-        colours.reshape(-1, 3)[which] = self.lighting.shade(
-            points, self.melanin[own], self.key[own], self.eye, which
-        )
-        pieces = self.render.subdivide
-        if pieces > 1:
-            points, colours = smooth(points, pieces), _between(colours, pieces)
-            segments = np.repeat(segments, pieces, axis=1)
+        shade = partial(self.lighting.shade, shaded, self.melanin[own], self.key[own], self.eye)
+        colours = np.zeros_like(points)
+        colours.reshape(-1, 3)[which] = smooth_colours(shade, shaded.shape[1], pieces, which)
         if shape == "lines":
             self.target.lines(points, colours, segments)
             return
@@ -215,14 +214,6 @@ class FrameRenderer:
         forward = np.subtract(self.camera.look_at, self.camera.position)
         depth = (corners - self.eye) @ (forward / np.linalg.norm(forward))
         return float(depth.min()) - _MARGIN, float(depth.max()) + _MARGIN
-
-
-def _between(colours: NDArray[np.float32], pieces: int) -> NDArray[np.float32]:
-    """Colours of subdivided strands: (S, P, 3) linearly interpolated to (S, (P-1) pieces + 1, 3)."""
-    t = (np.arange(pieces, dtype=np.float32) / np.float32(pieces))[:, None]
-    a, b = colours[:, :-1, None], colours[:, 1:, None]
-    inner = (a + t * (b - a)).reshape(len(colours), -1, 3)
-    return np.concatenate([inner, colours[:, -1:]], axis=1)
 
 
 def _box_corners(box: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,5 +1,6 @@
 """Strands as shapes: which one fits the projected width, ribbons that face the camera, smooth subdivision."""
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from pipeline.config.schema import Render
 from pipeline.render.view import View
 
 Points = NDArray[np.float32]
+Which = NDArray[np.uint32]
 Shape = Literal["tubes", "ribbons", "lines", "coverage"]
 
 TUBES_FROM = 3.0  # [px] projected width where `auto` changes from coverage to tubes: from there on their roundness shows
@@ -63,6 +65,26 @@ def smooth(points: Points, pieces: int) -> Points:
     curve = b + t / 2 * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * b - a - 3 * c + d)))
     inner = curve.reshape(len(points), -1, points.shape[2])
     return np.ascontiguousarray(np.concatenate([inner, points[:, -1:]], axis=1), np.float32)
+
+
+def smooth_colours(
+    shade: Callable[[Which], NDArray[np.float32]], count: int, pieces: int, wanted: Which
+) -> NDArray[np.float32]:
+    """Linear RGB (n, 3) of points (n,), flat indices, of strands that `smooth` has subdivided.
+
+    Linear between their `count` points, of which `shade` gives the colours (m, 3) by flat indices (m,), ascending.
+    """
+    if pieces == 1:
+        return shade(wanted)
+    strand, place = np.divmod(wanted, np.uint32((count - 1) * pieces + 1))
+    segment, part = np.divmod(place, np.uint32(pieces))
+    before = strand * np.uint32(count) + segment
+    after = before + (part > 0)
+    shaded = np.unique(np.concatenate([before, after]))
+    colours = shade(shaded)
+    a, b = (colours[np.searchsorted(shaded, ends)] for ends in (before, after))
+    t = part.astype(np.float32)[:, None] / np.float32(pieces)
+    return np.asarray(a + t * (b - a))
 
 
 def ribbons(

@@ -10,10 +10,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from pipeline.body.distance import Grid
 from pipeline.body.normals import point_normals
 from pipeline.config.schema import Config, Contact, Scene, Simulate
 from pipeline.errors import InputError
-from pipeline.groom.head_field import distance_grid
+from pipeline.groom.head_field import Field
 from pipeline.groom.head_mesh import load_mesh
 from pipeline.groom.heads import make_head
 from pipeline.groom.procedural import Style
@@ -26,6 +27,11 @@ HEADS = {
     "fsaverage_head.ply": ("z", "y", 1.0),
 }
 Mesh = tuple[NDArray[np.float64], NDArray[np.int64]]
+
+
+def distance_grid(points: NDArray[np.float32], triangles: NDArray[np.int32], spacing: float) -> Field:
+    grid = Grid.around(points, spacing)
+    return Field(grid.measure(points, triangles).values, grid.origin, spacing)
 
 
 def octahedron() -> Mesh:
