@@ -92,8 +92,15 @@ class Style:
 
     def _evened(self, points: Vectors) -> Vectors:
         """Points at equal spacing, none of them below the skin."""
-        points = resampled(self._outside(points), self.groom.points)
-        return pushed_out(points, self.terrain.skin)[0]
+        skin = self.terrain.skin
+        points, through = pushed_out(resampled(self._outside(points), self.groom.points), skin)
+        # Over the sharp edge of a bust both sides push: what cannot leave the skin ends where it enters
+        for row in np.flatnonzero(through):
+            inside = skin.distance(points[row, 2:]) < 0
+            if inside.any():
+                left = max(2 + int(inside.argmax()), 3)
+                points[row] = resampled(points[row : row + 1, :left], self.groom.points)[0]
+        return points
 
     def _outside(self, points: Vectors) -> Vectors:
         """Points below the skin pushed out of it; roots stay on it."""
