@@ -12,23 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.strands.follow import features, shape_of
 from pipeline.strands.partings import NOBODY, Neighbours, Partings
 from pipeline.strands.rebuild import rebuild_error
 
 Points = NDArray[np.float32]
 Floats = NDArray[np.float64]
 
-_ROOT = 10e-3  # [m] of root distance that count as one
-_SHAPE = 30e-3  # [m] of shape difference that count as one
 _PREFIX = 20_000  # strands that are looked at, or more for many guides
 _ROUNDS = 12
 _STRAYS = 0.04  # of the guides that are chosen as the worst served
 _STRAY_ROUNDS = 2  # guides of the first round serve strays of the second
-_APART = 0.5  # strays less unlike than that are one
-_FIRST, _CLOSE = (
-    100,
-    0.1,
-)  # guides that a search for an error begins with; how near it comes to the least count
+_APART = 0.5  # strays less unlike than that are one, see `pipeline.strands.follow.features`
+_FIRST = 100  # guides that a search for an error begins with
+_CLOSE = 0.1  # of the least count: how near the search comes to it
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,7 @@ def _chosen(points: Points, count: int, partings: Partings) -> Choice:
     """`count` guides: clusters, then rounds of strays."""
     if count == len(points):
         return Choice(np.arange(count, dtype=np.uint32), np.zeros(count))
-    x = features(points)
+    x = features(points[:, 0].astype(np.float64), shape_of(points))
     strays = round(_STRAYS * count)
     guides = _nearest_strands(x, _clusters(x, count - strays))
     error = rebuild_error(points, guides, partings)
@@ -141,13 +138,6 @@ def shut_in(guides: NDArray[np.uint32], roots: NDArray[np.float32], partings: Pa
             still = partings.across(uv, uv[:1], np.zeros((len(uv), 1), np.int64))[:, 0]
             left, uv = left[still], uv[still]
     return np.array(found, np.uint32)
-
-
-def features(points: NDArray[np.float32]) -> NDArray[np.float64]:
-    """What guides are chosen by, (S, 12): root and three points relative to it."""
-    root, last = points[:, 0].astype(np.float64), points.shape[1] - 1
-    shape = [points[:, round(last * part)] - root for part in (1 / 3, 2 / 3, 1)]
-    return np.column_stack([root / _ROOT, *(s / _SHAPE for s in shape)])
 
 
 def _nearest_strands(x: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.uint32]:

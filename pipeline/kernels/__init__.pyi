@@ -843,7 +843,6 @@ class Raster:
         once more and compose again: only the pixels that lack hair are drawn, with nothing cut off.
         """
 
-# --- groom: random numbers, equal spacing, growth, curls, clumps (random, smooth_curve, grow, coil, locks .hpp) -------
 # --- groom: random numbers, equal spacing, growth, curls, clumps (random, smooth_curve, grow, coil, polylines .hpp) -------
 #
 # Points (S, P, 3) float64 [m] are strands root first, at equal parts of their `length` (S,) [m] unless told otherwise;
@@ -940,9 +939,9 @@ class Shape:
     """
 
     def __init__(self) -> None: ...
-    def ellipsoid(
-        self, join: str, blend: float, box: _F64, center: _F64, turn: _F64, radii: _F64
-    ) -> None: ...
+    def ellipsoid(self, join: str, blend: float, box: _F64, center: _F64, turn: _F64, radii: _F64) -> None:
+        """An ellipsoid by its middle (3,) [m] and radii (3,) [m]; raises ValueError for radii that are not positive."""
+
     def tube(self, join: str, blend: float, box: _F64, t: _F64, curve: _F64) -> None:
         """A tube by samples of a curve: parameters (n,), and (3, n, 4) x, y, z, radius with two derivatives."""
 

@@ -47,7 +47,7 @@ class GuideSet:
     @cached_property
     def features(self) -> Floats:
         """(G, 12): what the cost compares."""
-        return _features(self.roots.points, self.shape)
+        return features(self.roots.points, self.shape)
 
 
 def follow(
@@ -69,8 +69,7 @@ def follow(
 
     """
     candidate = guides.roots.near(root, CANDIDATES, enough=k + 1)
-    strands = _features(root, shape)
-    return kernels.follow(strands, guides.features, candidate, k, _ALIKE, _UNLIKE)
+    return kernels.follow(features(root, shape), guides.features, candidate, k, _ALIKE, _UNLIKE)
 
 
 def follow_itself(
@@ -83,5 +82,6 @@ def follow_itself(
     weight[own, 0] = 1
 
 
-def _features(root: Floats, shape: Floats) -> Floats:
+def features(root: Floats, shape: Floats) -> Floats:
+    """What strands differ by (n, 12): roots (n, 3) [m] and shapes (n, 9) in units that count the same, see the top."""
     return np.concatenate([root / _ROOT_SCALE, shape], axis=1)

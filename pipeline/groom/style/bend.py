@@ -11,9 +11,8 @@ from pipeline.groom.style.ground import Ground
 from pipeline.groom.style.hair import Hair, Vectors, dot, unit
 
 _ANGLE = 0  # use of chance
-_ALONG = (
-    0.05  # sine of the angle to the direction of the bend below which there is no telling which way to turn
-)
+# Sine of the angle to the direction of the bend below which there is no telling which way to turn
+_ALONG = 0.05
 
 
 def bent(hair: Hair, op: Bend, ground: Ground, chance: Chance) -> Hair:

@@ -14,6 +14,7 @@ from pipeline.body.distance import Grid
 from pipeline.groom.head_field import Field
 from pipeline.strands.random import uniform
 from pipeline.strands.resample import resampled
+from pipeline.strands.spacing import arc_length
 
 Floats = NDArray[np.float64]
 
@@ -122,7 +123,8 @@ def _phase(kind: Kind, root: Floats, index: NDArray[np.int64]) -> Floats:
 
 def _of_length(points: Floats, count: int) -> Floats:
     """The first `LENGTH` of strands, at equal spacing."""
-    along = np.pad(np.linalg.norm(np.diff(points, axis=1), axis=2).cumsum(axis=1), ((0, 0), (1, 0)))
     at = np.linspace(0, LENGTH, points.shape[1])
-    cut = [[np.interp(at, s, x[:, k]) for k in range(3)] for s, x in zip(along, points, strict=True)]
+    cut = [
+        [np.interp(at, s, x[:, k]) for k in range(3)] for s, x in zip(arc_length(points), points, strict=True)
+    ]
     return np.asarray(resampled(np.moveaxis(np.array(cut), 1, 2), count))
