@@ -54,7 +54,7 @@ class Combing:
     def flow(self, points: Points, normals: Points, standoff: Vectors) -> Vectors:
         """Unit directions of the combing (N, 3) in the planes of the normals (N, 3), for strands with these standoffs."""
         v = self._at(self.chart.uv(points) + standoff)[:, :3]
-        return _unit(_tangential(v, normals))
+        return _unit(tangential(v, normals))
 
     def crowding(self, points: Points) -> Vectors:
         """Density of roots (N,): more beside a parting, as hair flows away from it and none lies over it."""
@@ -122,7 +122,7 @@ def comb(head: Head, partings: Partings) -> Combing:
         away, swirl, apart = _from_partings(head, partings, points)
     else:
         away, swirl = np.tile(-chart.axes[2], (len(points), 1)), np.full(len(points), _WHORL)
-    away = _unit(_tangential(away, normals))
+    away = _unit(tangential(away, normals))
     c, s = np.cos(swirl)[:, None], np.sin(swirl)[:, None]
     flow = c * away + s * np.cross(normals, away)
     grid = np.column_stack([flow, apart]).astype(np.float32).reshape(CELLS, CELLS, 4)
@@ -162,7 +162,8 @@ def _ends(segments: Vectors) -> Vectors:
     return np.asarray(points[count == 1])
 
 
-def _tangential(v: Vectors, n: Points) -> Vectors:
+def tangential(v: NDArray[Any], n: Points) -> Vectors:
+    """Vectors (N, 3) without their part along unit normals n (N, 3)."""
     return np.asarray(v - np.einsum("ij,ij->i", v, n)[:, None] * n)
 
 

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Config
-from pipeline.groom.combing import Combing, comb
+from pipeline.groom.combing import Combing, comb, tangential
 from pipeline.groom.heads import Head
 from pipeline.groom.partings import partings_of
 from pipeline.groom.repairs import pushed_out
 from pipeline.groom.roots import place_roots
 from pipeline.groom.style.gather import held_in_rings
-from pipeline.groom.style.ground import Ground, Terrain, tangential
+from pipeline.groom.style.ground import Ground, Terrain
 from pipeline.groom.style.hair import LONGEST, Hair, bristles, unit
 from pipeline.groom.style.stack import CHUNK, Stack
 from pipeline.strands.held import HEAD, held_ends

@@ -24,7 +24,7 @@
 namespace ringlet {
 
 struct GridSettings {
-    double cell = 8e-3;     // [m] h
+    double cell = 12e-3;    // [m] h
     double density = 0.15;  // [kg/m^3] of the guides' own mass
     double pressure = 0.05; // [m^2/s^2] k_p
     double drag = 3;        // [1/s] c_v

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.config.schema import Direction
+from pipeline.groom.combing import tangential
 from pipeline.groom.style.chance import Chance
-from pipeline.groom.style.ground import Ground, tangential
+from pipeline.groom.style.ground import Ground
 from pipeline.groom.style.growth import Sprouts, grown, stretches, swept
 from pipeline.groom.style.hair import STEP, Hair, Vectors, cut_to, unit
 

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.config.schema import Gather
+from pipeline.groom.combing import tangential
 from pipeline.groom.head.distance import smoothstep
 from pipeline.groom.head_field import Field
 from pipeline.groom.style.chance import Chance
-from pipeline.groom.style.ground import Ground, tangential
+from pipeline.groom.style.ground import Ground
 from pipeline.groom.style.hair import LONGEST, STEP, Hair, Ties, Vectors, set_apart, unit
 
 _CHOSEN, _OWN = 0, 1  # uses of chance

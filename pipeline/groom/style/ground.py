@@ -3,10 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.config.schema import Varied
@@ -61,8 +59,3 @@ class Ground:
         if self.head is None or self.terrain is None:
             raise InputError(f"groom.style: {option.told} varies over a scalp, and a swatch has none")
         return varied(option, Scalp(self.seed, hair.index, hair.root, self.head, self.terrain))
-
-
-def tangential(v: NDArray[Any], n: Vectors) -> Vectors:
-    """Vectors (N, 3) without their part along unit normals n (N, 3)."""
-    return np.asarray(v - np.einsum("ij,ij->i", v, n)[:, None] * n)
