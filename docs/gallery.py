@@ -1,6 +1,6 @@
 """Writes docs/gallery.md: every style in configs/, as it was groomed and in motion, rendered by the project itself.
 
-python docs/gallery.py [NAME...] renders all styles, or some of them anew; pictures go to docs/pictures/gallery.
+python docs/gallery.py [NAME...] renders all styles, or some of them anew, `--page` writes the page alone; pictures go to docs/pictures/gallery.
 """
 
 import sys
@@ -25,8 +25,9 @@ first frame, the hair as it was groomed; the right one is frame {frame}, in moti
 
 def main(wanted: list[str]) -> None:
     """Render the styles that are wanted, all by default, and write the page of all."""
-    for name in wanted or STYLES:
-        render(name)
+    if wanted != ["--page"]:
+        for name in wanted or STYLES:
+            render(name)
     parts = [_HEAD.format(frame=FRAMES[1]), *(section(name) for name in STYLES)]
     (DOCS / "gallery.md").write_text("\n".join(parts))
 
