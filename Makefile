@@ -96,8 +96,9 @@ validate: env ## the physics against closed forms and rod equations; writes docs
 interpolation: env ## strands that follow guides against their own simulation; writes docs/interpolation.md
 	$(RINGLET) bench interpolation-error --page docs/interpolation.md
 
-gallery: env ## every style, rendered; writes docs/gallery.md
+gallery: env ## every style and every operator, rendered; writes docs/gallery.md and docs/operators.md
 	$(BIN)/python docs/gallery.py
+	$(BIN)/python docs/operators.py
 
 images: env ## golden images; differences go to an HTML page
 	$(BIN)/pytest tests/images

@@ -1,15 +1,12 @@
 """Writes docs/gallery.md: every style in configs/, as it was groomed and in motion, rendered by the project itself.
 
-python docs/gallery.py [NAME...] renders all styles, or some of them anew; pictures go to docs/pictures/gallery.
+python docs/gallery.py [NAME...] renders all styles, or some of them anew, `--page` writes the page alone; pictures go to docs/pictures/gallery.
 """
 
-import subprocess
 import sys
-from pathlib import Path
 
-from PIL import Image
+from panels import DOCS, rendered, side_by_side
 
-DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures" / "gallery"
 STYLES = ("default", "straight", "wavy", "side_parting", "bob", "crop", "curly", "coils", "ponytail")
 FRAMES = (1, 18)  # as groomed, and in motion
@@ -21,30 +18,25 @@ _HEAD = """# Gallery
 Every style is a config of a few dozen lines: an ordered stack of operators, each with a name, so that a config that extends
 another changes single values (`ringlet run configs/bob.toml -s groom.style.frizz.amplitude="1 mm"`). The left picture is the
 first frame, the hair as it was groomed; the right one is frame {frame}, in motion. Made by `make gallery`.
+
+[What each operator does](operators.md), one by one.
 """
 
 
 def main(wanted: list[str]) -> None:
     """Render the styles that are wanted, all by default, and write the page of all."""
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    for name in wanted or STYLES:
-        render(name)
+    if wanted != ["--page"]:
+        for name in wanted or STYLES:
+            render(name)
     parts = [_HEAD.format(frame=FRAMES[1]), *(section(name) for name in STYLES)]
     (DOCS / "gallery.md").write_text("\n".join(parts))
 
 
 def render(name: str) -> None:
     """Render the two frames of a style and put them side by side."""
-    experiment = f"gallery-{name}"
-    command = [sys.executable, "-m", "pipeline", "run", f"configs/{name}.toml", "-s", f"name={experiment}"]
-    command += ["-s", f"simulate.frames={FRAMES[1]}", "-s", f"render.size=[{SIZE[0]}, {SIZE[1]}]"]
-    for frame in FRAMES:
-        subprocess.run([*command, "--frames", str(frame)], check=True, cwd=DOCS.parent)
-    both = Image.new("RGB", (len(FRAMES) * SIZE[0], SIZE[1]))
-    for i, frame in enumerate(FRAMES):
-        with Image.open(DOCS.parent / "outputs" / experiment / "frames" / f"{frame:04d}.png") as picture:
-            both.paste(picture, (i * SIZE[0], 0))
-    both.save(PICTURES / f"{name}.webp", quality=QUALITY)
+    settings = (f"simulate.frames={FRAMES[1]}", f"render.size=[{SIZE[0]}, {SIZE[1]}]")
+    frames = rendered(DOCS.parent / "configs" / f"{name}.toml", f"gallery-{name}", settings, FRAMES)
+    side_by_side(frames, PICTURES / f"{name}.webp", QUALITY)
 
 
 def section(name: str) -> str:
