@@ -173,8 +173,9 @@ template <class Real> class Lattice {
         RINGLET_INLINE Cells(Vec3<Real> place, M here, const Box &box, size_t layer) {
             M x, y, z;
             below(place.x, x, f.x), below(place.y, y, f.y), below(place.z, z, f.z);
-            first = (y - box.low[1]) * int(layer) + (z - box.low[2]) * box.n[0] + (x - box.low[0]);
-            first = here ? first : M{};
+            // Lanes that take no part are far away: a product of theirs would overflow
+            x = here ? x - box.low[0] : M{}, y = here ? y - box.low[1] : M{}, z = here ? z - box.low[2] : M{};
+            first = y * int(layer) + z * box.n[0] + x;
             const L far = f.y * f.z;
             part[3] = far, part[2] = f.y - far, part[1] = f.z - far, part[0] = 1 - f.y - part[1];
             for (int lane = 0; lane < kLanes<Real>; ++lane) at[lane] = int(first[lane]);
