@@ -21,7 +21,7 @@ mkdir -p "$build"
 
 rm -rf "$build/tree"
 mkdir -p "$build/tree"
-(cd "$root" && find pipeline -name '*.py' -exec cp --parents {} "$build/tree" \;)
+(cd "$root" && find pipeline \( -name '*.py' -o -name '*.json' \) -exec cp --parents {} "$build/tree" \;)
 cp "$build/objects"/_portable*.so "$build/tree/pipeline/kernels/"
 
 # Python itself leaks on purpose; libasan must come before every other library, and finds __cxa_throw in libstdc++
