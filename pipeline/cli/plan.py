@@ -26,7 +26,8 @@ _HEAD_STORED_GB = 0.0036  # its meshes
 _HEAD_M3 = 0.02  # box around a head that holds its distance grid
 
 _GROOM_S_PER_POINT = 0.45e-6
-_GROOM_B_PER_STRAND = 60  # roots, and partings looked for between them
+_GROOM_B_PER_STRAND = 500  # roots, and what is looked for between them
+_READ_B_PER_STRAND = 320  # of a groom that a later stage reads
 _HEAD_S_PER_VOXEL = 4.5e-6
 _STEP_S_PER_POINT = {"float32": 40e-9, "float64": 80e-9}
 _GUIDE_B_PER_POINT = 1300
@@ -86,7 +87,7 @@ def _simulate(config: Config) -> Cost:
     steps = (simulate.frames + simulate.settle * simulate.fps) * simulate.substeps
     seconds = _START_S + _STEP_S_PER_POINT[simulate.precision] * points * steps * _slower()
     return Cost(
-        _START_GB + _GUIDE_B_PER_POINT * points / _GB,
+        _START_GB + (_GUIDE_B_PER_POINT * points + _READ_B_PER_STRAND * config.groom.strands) / _GB,
         simulate.frames * 12 * points * _DEFLATED / _GB,
         seconds,
     )
@@ -95,8 +96,9 @@ def _simulate(config: Config) -> Cost:
 def _interpolate(config: Config) -> Cost:
     strands = _strands(config)
     row = 28 + 8 * config.interpolate.guides_per_strand
+    read = _READ_B_PER_STRAND * config.groom.strands
     return Cost(
-        _START_GB + 0.012 + _BIND_B_PER_STRAND * strands / _GB,
+        _START_GB + 0.012 + (_BIND_B_PER_STRAND * strands + read) / _GB,
         row * strands * _BOUND_DEFLATED / _GB,
         _START_S + _BIND_S_PER_STRAND * strands,
     )
