@@ -24,12 +24,13 @@ from pipeline.render.geometry import (
 from pipeline.render.lighting import Lighting
 from pipeline.render.target import Target
 from pipeline.render.tone import average, before_roll_off, develop
-from pipeline.render.view import View
+from pipeline.render.view import Place, View
 from pipeline.strands.expand import Expansion, MovedSkin
 from pipeline.strands.random import normal
 
 Points = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
+Linear = NDArray[np.float32]
 
 CHUNK = 65_536  # strands that are in flight at once
 _KEPT = 100 << 20  # [bytes] points that are kept from the first pass for the second; more are expanded twice
@@ -80,7 +81,6 @@ class FrameRenderer:
         render, scene = config.render, config.scene
         self.render, self.camera = render, View.of(scene.camera, head or Placement())
         self.strands, self.key, self.skin = strands, key, skin
-        self.eye = self.camera.position
         self.count = min(render.strands or strands.count, strands.count)
         self.width = drawn_width(render, self.count, strands.count)
         spread = np.clip(normal(config.seed, key, _MELANIN), -2, 2)
@@ -92,34 +92,41 @@ class FrameRenderer:
         background = before_roll_off(np.array(scene.background)) / render.exposure
         self.target = Target(across, down, tuple(background.tolist()))
 
-    def shape(self, moment: Moment) -> tuple[Shape, float]:
+    def shape(self, moment: Moment, view: View | None = None) -> tuple[Shape, float]:
         """How strands are drawn at a moment, and their projected width [px]."""
         middle = moment.guides.reshape(-1, 3).mean(axis=0, dtype=np.float64)
-        pixels = projected_width(self.render, self.camera, self.width, middle)
+        pixels = projected_width(self.render, view or self.camera, self.width, middle)
         return choose_shape(self.render, pixels), pixels
 
     def frame(self, moment: Moment) -> Pixels:
         """Render a moment: sRGB (H, W, 3) uint8."""
+        return develop(self.linear(moment), self.render.exposure)
+
+    def linear(self, moment: Moment, view: View | None = None) -> Linear:
+        """Render a moment as `view` sees it, or the camera of the scene: linear RGB (H, W, 3) before the exposure.
+
+        Pictures of several moments and views add up: motion blur and depth of field are means of them.
+        """
+        camera = view or self.camera
         self.strands.frame(moment.guides, moment.pose, moment.moved)
         # Whole margins: the grid of shadows stands still while hair moves a little, so that nothing shimmers
         lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
         upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
-        self.target.clear(self.camera, *self._depths(self._corners(moment, lower, upper)))
-        shape, pixels = self.shape(moment)
-        coverage = Coverage(self.target, self.render.size, self.camera) if shape == "coverage" else None
+        self.target.clear(camera, *self._depths(camera, self._corners(moment, lower, upper)))
+        shape, pixels = self.shape(moment, camera)
+        coverage = Coverage(self.target, self.render.size, camera) if shape == "coverage" else None
         kept = self._light(moment, lower, upper, coverage)
-        self._draw_head(moment)
+        self._draw_head(moment, camera.position)
         if coverage is not None:
-            linear = coverage.draw(
-                lambda: kept or self._chunks(), self._own_widths, self.render.subdivide, self._shade
+            shade = partial(self._shade, camera.position)
+            return coverage.draw(
+                lambda: kept or self._chunks(), self._own_widths, self.render.subdivide, shade
             )
-        else:
-            wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
-            veil = self.lighting.veil(self.eye, wider)
-            for first, points in kept or self._chunks():
-                self._draw_strands(shape, first, points, veil.visible(points))
-            linear = average(self.target.read(), self.render.samples)
-        return develop(linear, self.render.exposure)
+        wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
+        veil = self.lighting.veil(camera.position, wider)
+        for first, points in kept or self._chunks():
+            self._draw_strands(shape, camera.position, first, points, veil.visible(points))
+        return average(self.target.read(), self.render.samples)
 
     def _light(
         self,
@@ -143,10 +150,10 @@ class FrameRenderer:
         self.lighting.finish(skin.field if skin else None, moment.pose)
         return kept
 
-    def _shade(self, first: int, points: Points, which: NDArray[np.uint32]) -> Points:
+    def _shade(self, eye: Place, first: int, points: Points, which: NDArray[np.uint32]) -> Points:
         """Linear RGB (n, 3) of points (n,), flat indices, of strands (S, P, 3) from number `first` on."""
         own = slice(first, first + len(points))
-        return self.lighting.shade(points, self.melanin[own], self.key[own], self.eye, which)
+        return self.lighting.shade(points, self.melanin[own], self.key[own], eye, which)
 
     def _chunks(self, reuse: bool = True) -> Iterator[tuple[int, Points]]:
         buffer: Points | None = None
@@ -161,7 +168,9 @@ class FrameRenderer:
         profile = np.float32(self.width) * taper(self.render, points.shape[1])
         return np.ascontiguousarray(np.broadcast_to(profile, points.shape[:2]))
 
-    def _draw_strands(self, shape: Shape, first: int, points: Points, visible: NDArray[np.bool_]) -> None:
+    def _draw_strands(
+        self, shape: Shape, eye: Place, first: int, points: Points, visible: NDArray[np.bool_]
+    ) -> None:
         """Shade and draw what is visible of strands (S, P, 3); `visible` is (S, P)."""
         seen = np.flatnonzero(visible.any(axis=1))
         if len(seen) == 0:
@@ -174,7 +183,7 @@ class FrameRenderer:
         wanted[:, :-1] |= segments
         wanted[:, 1:] |= segments
         which = np.flatnonzero(wanted).astype(np.uint32)
-        shade = partial(self.lighting.shade, shaded, self.melanin[own], self.key[own], self.eye)
+        shade = partial(self.lighting.shade, shaded, self.melanin[own], self.key[own], eye)
         colours = np.zeros_like(points)
         colours.reshape(-1, 3)[which] = smooth_colours(shade, shaded.shape[1], pieces, which)
         if shape == "lines":
@@ -184,10 +193,10 @@ class FrameRenderer:
         if shape == "tubes":
             self.target.tubes(points, colours, widths, self.render.tube_sides)
             return
-        edges, triangles = ribbons(points, widths, self.eye, segments)
+        edges, triangles = ribbons(points, widths, eye, segments)
         self.target.triangles(edges.reshape(-1, 3), triangles, np.repeat(colours.reshape(-1, 3), 2, axis=0))
 
-    def _draw_head(self, moment: Moment) -> None:
+    def _draw_head(self, moment: Moment, eye: Place) -> None:
         """Draw the head, or where there is none the background."""
         skin, pose = moment.skin or self.skin, moment.pose
         if skin is None:
@@ -196,7 +205,7 @@ class FrameRenderer:
         rotation = pose[:3, :3]
         points = np.ascontiguousarray(skin.points @ rotation.T + pose[:3, 3], np.float32)
         normals = np.ascontiguousarray(skin.normals @ rotation.T, np.float32)
-        colours = self.lighting.shade_surface(points, normals, skin.albedo, self.eye)
+        colours = self.lighting.shade_surface(points, normals, skin.albedo, eye)
         self.target.triangles(points, skin.triangles, colours)
 
     def _corners(
@@ -209,10 +218,10 @@ class FrameRenderer:
             boxes.append(_box_corners(box) @ moment.pose[:3, :3].T + moment.pose[:3, 3])
         return np.concatenate([_box_corners(boxes[0]), *boxes[1:]])
 
-    def _depths(self, corners: NDArray[np.float64]) -> tuple[float, float]:
+    def _depths(self, camera: View, corners: NDArray[np.float64]) -> tuple[float, float]:
         """Nearest and farthest distance [m] of corners along the line of sight."""
-        forward = np.subtract(self.camera.look_at, self.camera.position)
-        depth = (corners - self.eye) @ (forward / np.linalg.norm(forward))
+        forward = np.subtract(camera.look_at, camera.position)
+        depth = (corners - camera.position) @ (forward / np.linalg.norm(forward))
         return float(depth.min()) - _MARGIN, float(depth.max()) + _MARGIN
 
 
