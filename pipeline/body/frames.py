@@ -35,10 +35,14 @@ class BodyFrames:
             np.stack([self.points.min(axis=(0, 1)), self.points.max(axis=(0, 1))]), self.spacing
         )
 
-    def skin(self, index: int) -> NDArray[np.float32]:
-        """Points (V, 3) [m] of a frame, counted from 0."""
-        return np.asarray(self.points[min(max(index, 0), len(self) - 1)])
+    def skin(self, index: float) -> NDArray[np.float32]:
+        """Points (V, 3) [m] of a frame, counted from 0; on straight lines between frames."""
+        at = min(max(index, 0), len(self) - 1)
+        first, part = int(at), np.float32(at % 1)
+        if part == 0:
+            return np.asarray(self.points[first])
+        return np.asarray((1 - part) * self.points[first] + part * self.points[first + 1])
 
-    def distance(self, index: int) -> kernels.MeshDistance:
+    def distance(self, index: float) -> kernels.MeshDistance:
         """Distance to the skin of a frame, counted from 0."""
         return self.grid.measure(self.skin(index), self.triangles)

@@ -67,8 +67,8 @@ class MovingSkin:
         self.body = body
         self._roots = SkinRoots(body.rest, body.triangles, roots, body.spacing)
 
-    def at(self, index: int) -> MovedSkin:
-        """The skin of a frame, counted from 0, and where it has carried the roots."""
+    def at(self, index: float) -> MovedSkin:
+        """The skin of a frame, counted from 0, or of a time between two, and where it has carried the roots."""
         return MovedSkin(
             self._roots.places(self.body.skin(index)), self.body.grid.field(self.body.distance(index))
         )

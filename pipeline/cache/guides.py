@@ -5,9 +5,11 @@ read and verified without its neighbours. Layout: VTKHDF 2.0, "PolyData", group 
 
     pose (F, 4, 4) float64          head rest -> world
     diagnostics/<name> (F,) float64
+    before/points (F (N-1) G P, 3) float32 [m], before/pose (F (N-1), 4, 4): where a simulation keeps N > 1 states of a
+    frame, those on the way to it, the earliest first
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline.cache.columns import Damaged
+from pipeline.cache.columns import Column, Damaged
 from pipeline.cache.store import Reader, Writer, create, open
 
 KIND = "guides"
@@ -36,24 +38,35 @@ class GuidesWriter:
         _set_type(writer)
 
     def append(
-        self, points: ArrayLike, pose: ArrayLike, diagnostics: Mapping[str, float] | None = None
+        self,
+        points: ArrayLike,
+        pose: ArrayLike,
+        diagnostics: Mapping[str, float] | None = None,
+        before: Sequence[tuple[ArrayLike, ArrayLike]] = (),
     ) -> None:
         """Append one frame: points (G, P, 3) float32 [m] in world space, pose (4, 4), figures of the frame.
 
-        Every frame must name the same diagnostics; raises ValueError for those and for wrong shapes.
+        `before` are points and poses on the way to it. Every frame must name the same diagnostics and have as many
+        states before it; raises ValueError for those and for wrong shapes.
         """
-        frame = np.asarray(points, np.float32)
-        if frame.shape != self._shape:
-            raise ValueError(f"guides: expected a frame of shape {self._shape}, got {frame.shape}")
+        frame = self._checked(points)
         figures = diagnostics or {}
         if self._frames == 0:
             self._diagnostics = {
                 name: self._writer.stream(f"diagnostics/{name}", (), np.float64) for name in figures
             }
+            self._states(1 + len(before))
+        if len(before) != self._writer.meta.get("states", 1) - 1:
+            raise ValueError(
+                f"guides: a frame has {len(before)} states before it, the first has another number"
+            )
         if figures.keys() != self._diagnostics.keys():
             raise ValueError(f"guides: expected the diagnostics {', '.join(self._diagnostics)}")
         self._points.append(frame.reshape(-1, 3))
         self._pose.append(np.asarray(pose, np.float64)[None])
+        for state, state_pose in before:
+            self._before_points.append(self._checked(state).reshape(-1, 3))
+            self._before_pose.append(np.asarray(state_pose, np.float64)[None])
         for name, value in figures.items():
             self._diagnostics[name].append([float(value)])
         self._frames += 1
@@ -78,6 +91,21 @@ class GuidesWriter:
         self._write("Steps/ConnectivityIdOffsets", np.zeros((frames, len(_TOPOLOGIES))))
         self._writer.file["VTKHDF"].require_group("Steps").attrs["NSteps"] = frames
 
+    def _checked(self, points: ArrayLike) -> NDArray[np.float32]:
+        frame = np.asarray(points, np.float32)
+        if frame.shape != self._shape:
+            raise ValueError(f"guides: expected a frame of shape {self._shape}, got {frame.shape}")
+        return frame
+
+    def _states(self, count: int) -> None:
+        """Prepare for frames of `count` states; a file of one state each is none the wiser."""
+        if count == 1:
+            return
+        rows = self._shape[0] * self._shape[1]
+        self._writer.meta["states"] = count
+        self._before_points = self._writer.stream("before/points", (3,), np.float32, chunk_rows=rows)
+        self._before_pose = self._writer.stream("before/pose", (4, 4), np.float64)
+
     def _write(self, name: str, values: ArrayLike) -> None:
         self._writer.write(f"VTKHDF/{name}", np.asarray(values).astype(np.int64))
 
@@ -98,6 +126,11 @@ class GuidesReader:
         self._points, self._pose = reader["VTKHDF/Points"], reader["pose"]
         if len(self._points) != self.frames * self.guides * self.points or len(self._pose) != self.frames:
             raise Damaged(reader.path, "the number of frames does not fit the points")
+        self.states = int(reader.meta.get("states", 1))
+        if self.states > 1:
+            self._before_points, self._before_pose = reader["before/points"], reader["before/pose"]
+            if len(self._before_pose) != self.frames * (self.states - 1):
+                raise Damaged(reader.path, "the number of states does not fit the frames")
         self.diagnostics: dict[str, NDArray[np.float64]] = {
             name.removeprefix("diagnostics/"): reader[name][:]
             for name in reader.names
@@ -106,13 +139,24 @@ class GuidesReader:
 
     def frame(self, index: int) -> NDArray[np.float32]:
         """Points (G, P, 3) float32 [m] of a frame, counted from 0; raises IndexError, or Damaged."""
-        first = range(self.frames)[index] * self.guides * self.points
-        rows = self._points[first : first + self.guides * self.points]
-        return rows.reshape(self.guides, self.points, 3)
+        return self._rows(self._points, range(self.frames)[index])
 
     def pose(self, index: int) -> NDArray[np.float64]:
         """Head rest -> world (4, 4) float64 of a frame."""
         return self._pose[index]
+
+    def state(self, index: int, back: int) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Points and pose of a frame's state `back` states before the frame itself; raises IndexError, or Damaged."""
+        if back == 0:
+            return self.frame(index), self.pose(index)
+        if not 0 < back < self.states:
+            raise IndexError(f"{back} states before a frame of {self.states}")
+        at = (range(self.frames)[index] + 1) * (self.states - 1) - back
+        return self._rows(self._before_points, at), self._before_pose[at]
+
+    def _rows(self, column: Column, frame: int) -> NDArray[np.float32]:
+        size = self.guides * self.points
+        return column[frame * size : (frame + 1) * size].reshape(self.guides, self.points, 3)
 
 
 @contextmanager

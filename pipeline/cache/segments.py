@@ -8,6 +8,7 @@ damaged, or made from other inputs, is removed together with all later ones, and
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,8 @@ class Frame:
     points: NDArray[np.float32]
     pose: NDArray[np.float64]
     diagnostics: Mapping[str, float] = field(default_factory=dict)
+    before: Sequence[tuple[NDArray[np.float32], NDArray[np.float64]]] = ()
+    """Points and pose of the states on the way to it, the earliest first, that are kept."""
 
 
 class Segments:
@@ -62,6 +65,10 @@ class Segments:
         with create(self._path(), KIND, self.key) as writer:
             writer.write("points", np.stack([frame.points for frame in frames]), chunk_rows=1)
             writer.write("pose", np.stack([frame.pose for frame in frames]))
+            if frames[0].before:
+                points, poses = zip(*(state for frame in frames for state in frame.before), strict=True)
+                writer.write("before/points", np.stack(points), chunk_rows=1)
+                writer.write("before/pose", np.stack(poses))
             for name, array in checkpoint.items():
                 writer.write(f"checkpoint/{name}", np.asarray(array)[None])
             writer.meta["count"] = len(frames)
@@ -82,9 +89,8 @@ class Segments:
         with create_guides(
             self.guides_file, self.key, provenance, guides=guides, points=points, fps=fps
         ) as writer:
-            writer.append(first.points, first.pose, first.diagnostics)
-            for frame in frames:
-                writer.append(frame.points, frame.pose, frame.diagnostics)
+            for frame in chain([first], frames):
+                writer.append(frame.points, frame.pose, frame.diagnostics, frame.before)
         self.remove()
 
     def remove(self) -> None:
@@ -114,5 +120,10 @@ def _frames(reader: Reader) -> Iterator[Frame]:
     points, poses, figures = reader["points"], reader["pose"][:], reader.meta["diagnostics"]
     if len(poses) != len(figures):
         raise Damaged(reader.path, "the number of frames does not fit the diagnostics")
+    states, state_poses = (
+        reader[f"before/{name}"] if "before/pose" in reader else () for name in ("points", "pose")
+    )
+    each = len(state_poses) // len(poses)
     for index, diagnostics in enumerate(figures):
-        yield Frame(points[index], poses[index], diagnostics)
+        before = [(states[k], state_poses[k]) for k in range(index * each, (index + 1) * each)]
+        yield Frame(points[index], poses[index], diagnostics, before)

@@ -18,8 +18,8 @@ class DrawnBody:
         self.body, self.skin = body, skin
         self._moving = MovingSkin(body, roots)
 
-    def at(self, index: int, moment: Moment) -> Moment:
-        """The moment with the skin of a frame, counted from 0."""
+    def at(self, index: float, moment: Moment) -> Moment:
+        """The moment with the skin of a frame, counted from 0, or of a time between two."""
         points = self.body.skin(index)
         moved = self._moving.at(index)
         normals = point_normals(points, self.body.triangles).astype(np.float32)

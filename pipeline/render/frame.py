@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipeline import kernels
 from pipeline.body.placement import Placement
 from pipeline.config.schema import Config
+from pipeline.render.camera import CameraPath
 from pipeline.render.coverage import Coverage
 from pipeline.render.geometry import (
     Shape,
@@ -79,7 +80,7 @@ class FrameRenderer:
     ) -> None:
         """Prepare for strands with random keys (N,). Raises InputError when there is no off-screen OpenGL."""
         render, scene = config.render, config.scene
-        self.render, self.camera = render, View.of(scene.camera, head or Placement())
+        self.render, self.camera = render, CameraPath.of(scene.camera, head or Placement()).at(0.0)
         self.strands, self.key, self.skin = strands, key, skin
         self.count = min(render.strands or strands.count, strands.count)
         self.width = drawn_width(render, self.count, strands.count)
@@ -91,6 +92,8 @@ class FrameRenderer:
         # Exposure and roll-off apply to what is lit; the background is meant as it is written.
         background = before_roll_off(np.array(scene.background)) / render.exposure
         self.target = Target(across, down, tuple(background.tolist()))
+        self._lit: Moment | None = None
+        self._kept: list[tuple[int, Points]] = []
 
     def shape(self, moment: Moment, view: View | None = None) -> tuple[Shape, float]:
         """How strands are drawn at a moment, and their projected width [px]."""
@@ -105,17 +108,25 @@ class FrameRenderer:
     def linear(self, moment: Moment, view: View | None = None) -> Linear:
         """Render a moment as `view` sees it, or the camera of the scene: linear RGB (H, W, 3) before the exposure.
 
-        Pictures of several moments and views add up: motion blur and depth of field are means of them.
+        Pictures of several moments and views add up: motion blur and depth of field are means of them. The light on
+        the moment of the call before, the same object, is there already.
         """
         camera = view or self.camera
-        self.strands.frame(moment.guides, moment.pose, moment.moved)
+        if moment is not self._lit:
+            self.strands.frame(moment.guides, moment.pose, moment.moved)
         # Whole margins: the grid of shadows stands still while hair moves a little, so that nothing shimmers
         lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
         upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
         self.target.clear(camera, *self._depths(camera, self._corners(moment, lower, upper)))
         shape, pixels = self.shape(moment, camera)
         coverage = Coverage(self.target, self.render.size, camera) if shape == "coverage" else None
-        kept = self._light(moment, lower, upper, coverage)
+        if moment is not self._lit:
+            self._kept = self._light(moment, lower, upper, coverage)
+            self._lit = moment
+        elif coverage is not None:
+            for first, points in self._kept or self._chunks():
+                coverage.count(first, points, self._own_widths(points))
+        kept = self._kept
         self._draw_head(moment, camera.position)
         if coverage is not None:
             shade = partial(self._shade, camera.position)

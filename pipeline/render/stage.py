@@ -8,6 +8,7 @@ import platform
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,11 @@ from pipeline.cache.expansion import body_frames, distance_field, expansion_from
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.render.body import DrawnBody
+from pipeline.render.camera import CameraPath
 from pipeline.render.frame import FrameRenderer, Moment, Pixels, Skin
+from pipeline.render.passes import mean, passes
 from pipeline.render.target import Target
+from pipeline.render.tone import develop
 
 Record = dict[str, Any]
 
@@ -36,6 +40,7 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
         skin, moving, head = _skin(groom), body_frames(groom), placement(groom)
         body = DrawnBody(moving, skin, strands["strands/root"][:]) if moving and skin else None
     renderer = FrameRenderer(config, expansion, keys, skin, head)
+    path = CameraPath.of(config.scene.camera, head, config.simulate.frames, config.simulate.fps)
     record = provenance(config, "render")
     texts = {"config": config.name}
     shape = ""
@@ -44,19 +49,39 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
         _writer() as write,
         track("render", len(wanted)) as bar,
     ):
+        moments = Moments(guides, body)
         for number in wanted:
-            moment = Moment(guides.frame(number - 1), guides.pose(number - 1))
-            if body is not None:
-                moment = body.at(number - 1, moment)
-            name, pixels_wide = renderer.shape(moment)
+            shots = list(passes(config, path, number))
+            name, pixels_wide = renderer.shape(moments.at(number, 0), shots[0].view)
             if name != shape:
                 say("render", f"strands are {name}, {pixels_wide:.2g} px wide, from frame {number} on")
                 shape = name
-            picture = renderer.frame(moment)
+            picture = develop(
+                mean(renderer.linear(moments.at(number, shot.back), shot.view) for shot in shots),
+                config.render.exposure,
+            )
             texts |= {"geometry": name, "frame": str(number), "fingerprint": fingerprint(renderer.target)}
             write(experiment.frames / f"{number:04d}.png", picture, key, record, dict(texts))
             bar.advance()
     renderer.target.close()
+
+
+class Moments:
+    """What is drawn of a simulation; the last one that was asked for is kept as it is."""
+
+    def __init__(self, guides: cache.GuidesReader, body: DrawnBody | None) -> None:
+        self._guides, self._body = guides, body
+        self._at = lru_cache(1)(self._read)
+
+    def at(self, number: int, back: int) -> Moment:
+        """The moment of a frame, counted from 1, or `back` states before it."""
+        return self._at(number, back)
+
+    def _read(self, number: int, back: int) -> Moment:
+        moment = Moment(*self._guides.state(number - 1, back))
+        if self._body is None:
+            return moment
+        return self._body.at(max(0.0, number - 1 - back / self._guides.states), moment)
 
 
 def fingerprint(target: Target) -> str:

@@ -61,6 +61,8 @@ class Target:
         view.SetFocalPoint(*camera.look_at)
         view.SetViewUp(*camera.up)
         view.SetViewAngle(np.degrees(camera.field_of_view))
+        half = np.tan(camera.field_of_view / 2)
+        view.SetWindowCenter(camera.shift[0] / half * self.height / self.width, camera.shift[1] / half)
         view.SetClippingRange(max(near - _MARGIN, 0.01 * far), far + _MARGIN)
         self._renderer.PreserveColorBufferOff()
         self._renderer.PreserveDepthBufferOff()

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.body.keyed import harmonic
+
 Vector = NDArray[np.float64]
 Pose = NDArray[np.float64]
 
@@ -166,20 +168,12 @@ def curve_of_keys(times: Vector, turns: Vector, ways: Vector) -> Curve:
     step[:, :3] = [wound(*pair) for pair in zip(step[:, :3], np.diff(turns, axis=0), strict=True)]
     length = np.diff(times)[:, None]
     velocity = np.zeros((len(times), 6))
-    velocity[1:-1] = _harmonic(step / length, length)
+    velocity[1:-1] = harmonic(step / length, length)
     first, last = length / 3 * velocity[:-1], length / 3 * velocity[1:]
     middle = log(exp(-first) @ relative @ exp(-last))
     left = (step - first - last)[:, :3]
     middle[:, :3] = [wound(*pair) for pair in zip(middle[:, :3], left, strict=True)]
     return Curve(times, poses, np.stack([first, middle, last], axis=1), velocity[-1], float(times[-1]))
-
-
-def _harmonic(rate: Vector, length: Vector) -> Vector:
-    """Velocities (K-2, 6) at inner keyframes between pieces of these rates (K-1, 6) and lengths (K-1, 1)."""
-    a, b, h, k = rate[:-1], rate[1:], length[:-1], length[1:]
-    mean = (2 * k + h) * b + (k + 2 * h) * a
-    along = np.maximum((a * b).sum(axis=1, keepdims=True), 0)
-    return np.asarray(3 * (h + k) * along * mean / np.maximum((mean**2).sum(axis=1, keepdims=True), 1e-300))
 
 
 def _cubic(square: Vector) -> Vector:

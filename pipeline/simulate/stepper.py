@@ -1,6 +1,6 @@
 """The guides in motion: a state, the clock, and what moves them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ from pipeline.simulate.wind import wind
 from pipeline.strands.held import HAND
 
 Arrays = dict[str, NDArray[Any]]
+Placed = tuple[NDArray[np.float32], Pose]
 
 _ENERGIES = ("bending", "torsion", "kinetic", "gravity")
 _STATE = ("points", "velocity", "tension", "contact", "directors", "twist")
@@ -91,7 +92,8 @@ class Simulation:
         load = self.rest.load  # after the groom has found its rest: it is to give way to this load
         load[:, -1] += simulate.tip_load
         self.rest.load = load
-        self._diagnostics = _summary(None)
+        self._diagnostics = _summary([])
+        self._before = self._still()
 
     def settle(self, report: Callable[[int], None] = lambda _: None) -> None:
         """Let the guides come to rest with the head at its first pose; `report` hears of steps done."""
@@ -100,9 +102,11 @@ class Simulation:
         for first in range(-steps, 0, self.simulate.substeps):
             self.step = first
             count = min(self.simulate.substeps, -first)
-            self._advance(count, damped if first < -steps // 2 else self.settings)
+            done = self._advance(count, damped if first < -steps // 2 else self.settings)
+            self._diagnostics = _summary([done])
             report(count)
         self.step = 0
+        self._before = self._still()
 
     @property
     def settling_steps(self) -> int:
@@ -110,14 +114,27 @@ class Simulation:
         return round(self.simulate.settle / self.settings.dt)
 
     def next_frame(self) -> None:
-        """Step to the next frame. Raises SimulationDiverged."""
-        self._advance(self.simulate.substeps, self.settings)
+        """Step to the next frame, keeping states on the way. Raises SimulationDiverged."""
+        parts = self.simulate.states
+        reports, self._before = [], []
+        for part in range(parts):
+            reports.append(self._advance(self.simulate.substeps // parts, self.settings))
+            if part < parts - 1:
+                self._before.append(self._placed())
+        self._diagnostics = _summary(reports)
 
     def frame(self) -> Frame:
         """The frame at the present step: energies [J] of all guides, worst strain and penetration [m] on the way."""
         energies = kernels.energies(self.state, self.rest, self.settings).sum(axis=0)
         diagnostics = dict(zip(_ENERGIES, energies.tolist(), strict=True)) | self._diagnostics
-        return Frame(self.state.points.astype(np.float32), self.head(self._time(0)), diagnostics)
+        return Frame(*self._placed(), diagnostics, tuple(self._before))
+
+    def _placed(self) -> Placed:
+        return self.state.points.astype(np.float32), self.head(self._time(0))
+
+    def _still(self) -> list[Placed]:
+        """The states on the way to the first frame: everything stands as at it."""
+        return [self._placed()] * (self.simulate.states - 1)
 
     def save(self) -> Arrays:
         """All that the future depends on."""
@@ -129,7 +146,7 @@ class Simulation:
         self.state = kernels.State(**{name: np.ascontiguousarray(saved[name]) for name in _STATE})
         self.step = int(saved["step"][0])
 
-    def _advance(self, count: int, settings: kernels.StepSettings) -> None:
+    def _advance(self, count: int, settings: kernels.StepSettings) -> kernels.Report:
         head = self.head.piece(self._time(0))
         heads = [head(self._time(i)) for i in range(count + 1)]
         hands = [pose @ self.hand(self._time(i)) for i, pose in enumerate(heads)]
@@ -144,18 +161,19 @@ class Simulation:
         report = kernels.advance(self.state, self.rest, field, drive, settings, self.neighbours)
         self.cost.add(count, report)
         self.step += count
-        self._diagnostics = _summary(report)
         if report.bad_strand >= 0:
             raise SimulationDiverged(report.bad_strand, 1 - (-self.step // self.simulate.substeps))
         if self.head.piece(self._time(0)) is not head:
             self._carry(self.head(self._time(0)) @ inverse(heads[-1]))
+        return report
 
     def _carry(self, jump: Pose) -> None:
-        """Carry everything rigidly over a jump (4, 4) of the head: points, velocities and directors."""
+        """Carry everything rigidly over a jump (4, 4) of the head: points, velocities, directors and states on the way."""
         state, turn = self.state, jump[:3, :3].T
         state.points[:] = place(jump, state.points)
         state.velocity[:] = state.velocity @ turn
         state.directors[:] = state.directors @ turn
+        self._before = [(place(jump, x).astype(np.float32), jump @ pose) for x, pose in self._before]
 
     def _time(self, steps: float) -> float:
         return (self.step + steps) * self.settings.dt
@@ -176,16 +194,17 @@ class Simulation:
         return state
 
 
-def _summary(report: kernels.Report | None) -> dict[str, float]:
+def _summary(reports: Sequence[kernels.Report]) -> dict[str, float]:
     """What a frame's steps were like: worst strain, penetration [m] and rounds; means a step; halvings in all."""
+    count = max(1, len(reports))
     return {
-        "strain": report.strain if report else 0.0,
-        "penetration": report.depth if report else 0.0,
-        "rounds": report.rounds if report else 0.0,
-        "rounds_worst": float(report.rounds_max) if report else 0.0,
-        "contacts": report.contacts if report else 0.0,
-        "solves": report.solves if report else 0.0,
-        "halvings": float(report.halvings) if report else 0.0,
+        "strain": max((report.strain for report in reports), default=0.0),
+        "penetration": max((report.depth for report in reports), default=0.0),
+        "rounds": sum(report.rounds for report in reports) / count,
+        "rounds_worst": float(max((report.rounds_max for report in reports), default=0)),
+        "contacts": sum(report.contacts for report in reports) / count,
+        "solves": sum(report.solves for report in reports) / count,
+        "halvings": float(sum(report.halvings for report in reports)),
     }
 
 

@@ -17,7 +17,7 @@ from pipeline.groom import stage
 from pipeline.groom.head_mesh import load_mesh, zero_surface
 from pipeline.groom.heads import Head, make_head
 from pipeline.groom.procedural import Style
-from pipeline.render.view import View
+from pipeline.render.camera import CameraPath
 from pipeline.simulate.motion import head_motion
 from tests.stages.conftest import shipped
 
@@ -246,7 +246,9 @@ def test_camera_and_pivot_follow_the_head(
     stage.execute(config, cache.Experiment(tmp_path), "groom")
     with cache.open(tmp_path / "groom.h5", "groom") as groom:
         head = placement(groom)
-    view, told = (View.of(camera, head) for camera in (Camera(), Camera(position=(1.0, 2.0, 3.0))))
+    view, told = (
+        CameraPath.of(camera, head).at(0.0) for camera in (Camera(), Camera(position=(1.0, 2.0, 3.0)))
+    )
     pose = head_motion(Motion(preset="turn", amplitude=0.5), head=head).pieces[0](1.0)
     pivot = np.append(plain.to_world(np.array([0.0, -0.05, -0.015])), 1)
     print(

@@ -5,10 +5,10 @@ import pytest
 
 from pipeline.body.placement import Placement
 from pipeline.config.schema import Camera, Render
+from pipeline.render.camera import CameraPath
 from pipeline.render.geometry import choose_shape, drawn_width, projected_width, ribbons, smooth, taper
 from pipeline.render.target import BRIGHTEST, DECODED, encode
 from pipeline.render.tone import SHOULDER, WHITE, average, before_roll_off, develop, roll_off, to_srgb
-from pipeline.render.view import View
 
 
 @pytest.mark.parametrize(("pixels", "shape"), [(0.2, "coverage"), (1.5, "coverage"), (3.5, "tubes")])
@@ -18,9 +18,9 @@ def test_auto_draws_by_projected_width(pixels: float, shape: str) -> None:
 
 
 def test_projected_width_is_that_of_a_pinhole_camera() -> None:
-    camera = View.of(
+    camera = CameraPath.of(
         Camera(position=(0, 0, 1), look_at=(0, 0, 0), field_of_view=2 * np.arctan(0.5)), Placement()
-    )
+    ).at(0.0)
     width = projected_width(Render(size=(640, 480)), camera, 0.01, np.zeros(3))
     print(f"1 cm at 1 m, 1 m high picture of 480 px: {width:.3f} px")
     assert width == pytest.approx(4.8)

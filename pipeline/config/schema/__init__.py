@@ -3,18 +3,20 @@
 `--help` texts, `configs/schema.json` and the table in the docs are generated from it.
 """
 
+import math
 from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from pipeline.config.schema.base import Section
+from pipeline.config.schema.camera import Camera, CameraKeyframe, open_states
 from pipeline.config.schema.groom import Groom, Swatch
 from pipeline.config.schema.hair_contact import HairContact
 from pipeline.config.schema.interpolate import Interpolate, Variation
 from pipeline.config.schema.partings import Parting
 from pipeline.config.schema.render import Fibre, Render
 from pipeline.config.schema.scalp import Plane, Scalp
-from pipeline.config.schema.scene import Camera, Light, Scene
+from pipeline.config.schema.scene import Light, Scene
 from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, SagFree, Simulate
 from pipeline.config.schema.style import (
     AnyOperator,
@@ -39,6 +41,7 @@ __all__ = [
     "AnyOperator",
     "Bend",
     "Camera",
+    "CameraKeyframe",
     "Clump",
     "Config",
     "Contact",
@@ -76,6 +79,7 @@ __all__ = [
     "VariedFraction",
     "VariedLength",
     "Wave",
+    "open_states",
 ]
 
 
@@ -94,6 +98,20 @@ class Config(Section):
     """Stage 3: which guides move which strand."""
     render: Render = Render()
     """Stage 4: the frames."""
+
+    @model_validator(mode="after")
+    def _shutter_sees_motion(self) -> "Config":
+        shutter, simulate = self.scene.camera.shutter, self.simulate
+        if not shutter or open_states(shutter, simulate.states) > 1:
+            return self
+        enough = (n for n in range(2, 1001) if simulate.substeps % n == 0 and open_states(shutter, n) > 1)
+        remedy = next(
+            (f"set simulate.states = {n}" for n in enough), "set simulate.substeps and simulate.states higher"
+        )
+        raise ValueError(
+            f"scene.camera.shutter is open for {math.degrees(shutter):g} degrees of 360, but the simulation keeps "
+            f"simulate.states = {simulate.states} a frame, and motion blur needs two or more of them meanwhile; {remedy}"
+        )
 
     @model_validator(mode="after")
     def _source_fits_head(self) -> "Config":

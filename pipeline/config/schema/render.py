@@ -42,6 +42,8 @@ class Render(Section):
     """Drawn segments per segment, along a smooth curve through the points."""
     tube_sides: Annotated[int, Field(ge=3, le=32)] = 4
     """Sides of a tube."""
+    passes: Annotated[int, Field(ge=1, le=1024)] = 32
+    """Pictures that a frame is the mean of, where the camera has an f_stop or a shutter; each costs what a frame costs without."""
     grid: Annotated[int, Field(ge=16, le=512)] = 128
     """Voxels along the longest side of the density grid that gives hair its shadows."""
     exposure: Annotated[float, Field(gt=0)] = 1.25

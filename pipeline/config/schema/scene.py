@@ -1,11 +1,11 @@
-"""Options of the scene: head, lights and camera."""
+"""Options of the scene: head, lights and what is around them."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.config.schema.base import Colour, FaceAxis, Position, Section, Vector
-from pipeline.config.units import Angle
+from pipeline.config.schema.base import Colour, FaceAxis, Section, Vector
+from pipeline.config.schema.camera import Camera
 
 
 class Light(Section):
@@ -15,17 +15,6 @@ class Light(Section):
     """Linear RGB."""
     irradiance: Annotated[float, Field(ge=0)] = 1.0
     """Irradiance on a surface that faces the light [W/m^2]; multiplies the colour."""
-
-
-class Camera(Section):
-    position: Position | None = None
-    """Where the camera stands [m]; unset, at (0.40, 0.02, 0.80) from the built-in head, and likewise from any other."""
-    look_at: Position | None = None
-    """The point in the middle of the picture [m]; unset, (0, -0.03, 0) of the built-in head, and likewise of any other."""
-    up: Vector = (0.0, 1.0, 0.0)
-    """The direction that is up in the picture."""
-    field_of_view: Annotated[Angle, Field(gt=0, lt=3)] = 0.4886921905584123
-    """Vertical field of view."""
 
 
 class Scene(Section):

@@ -118,6 +118,8 @@ class Simulate(Section):
     """Frames per second."""
     substeps: Annotated[int, Field(ge=1, le=1000)] = 10
     """Steps per frame; 10 at 24 fps is dt = 1/240 s."""
+    states: Annotated[int, Field(ge=1, le=1000)] = 1
+    """States that are kept of a frame, for motion blur; the frame's is the last, the others are as many equal parts of a frame before it. Divides substeps."""
     settle: Annotated[Duration, Field(ge=0)] = 2.0
     """Simulated time before frame 1, with the head at its first pose."""
     precision: Literal["float32", "float64"] = "float64"
@@ -159,6 +161,16 @@ class Simulate(Section):
     def _one_motion_of_tips(self) -> "Simulate":
         if self.tips and self.tips_file is not None:
             raise ValueError("the motion of tips comes from tips or from tips_file; remove one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _states_are_steps(self) -> "Simulate":
+        if self.substeps % self.states:
+            near = max(n for n in range(1, self.states + 1) if self.substeps % n == 0)
+            raise ValueError(
+                f"states = {self.states} does not divide substeps = {self.substeps}; set states = {near}, or substeps "
+                f"to a multiple of {self.states}"
+            )
         return self
 
     @model_validator(mode="after")
