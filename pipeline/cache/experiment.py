@@ -38,6 +38,11 @@ class Experiment:
         """The folder of the pictures."""
         return self.folder / "frames"
 
+    @property
+    def log(self) -> Path:
+        """What its runs have said, as JSON lines (see pipeline/log.py)."""
+        return self.folder / "log.jsonl"
+
     @contextmanager
     def working_on(self, stage: str) -> Iterator[None]:
         """Keep other processes away from a stage while it is made; waits, and says so, while one is at it.

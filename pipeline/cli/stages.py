@@ -2,11 +2,12 @@
 
 import importlib
 import os
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline import cache
+from pipeline import cache, log
 from pipeline.config import STAGES, Config, explain, stage_inputs, stage_keys
 from pipeline.progress import say
 
@@ -62,13 +63,19 @@ class Batch:
             with self.experiment.working_on(stage):
                 state = self.state(stage, frames)  # another process may just have made it
                 if not state.fresh:
-                    say(stage, f"start ({state.reason})")
-                    self.execute(stage, state.frames)
+                    self._run(stage, state)
         if touch and state.fresh:
             say(stage, "fresh")
         if touch:
             for path in self.outputs(stage, frames):
                 os.utime(path)
+
+    def _run(self, stage: str, state: State) -> None:
+        start = time.monotonic()
+        log.emit(stage, "begin", f"start ({state.reason})", reason=state.reason, frames=len(state.frames))
+        self.execute(stage, state.frames)
+        seconds = round(time.monotonic() - start, 3)
+        log.emit(stage, "end", f"made in {seconds} s", seconds=seconds, peak_gb=round(log.peak_gb(), 3))
 
     def execute(self, stage: str, frames: tuple[int, ...]) -> None:
         """Run the code of a stage; of the render, for these frames."""

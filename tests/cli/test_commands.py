@@ -238,7 +238,7 @@ def test_a_full_disk_ends_a_run_with_one_message_and_nothing_lost(tmp_path: Path
     assert result.returncode == 2
     assert "guides.h5: no room on the disk" in result.stderr
     assert "Traceback" not in result.stderr
-    assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["groom.h5", "locks"]
+    assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["groom.h5", "locks", "log.jsonl"]
 
 
 @pytest.mark.parametrize(("signal", "code"), [("INT", 130), ("TERM", 143)])
@@ -271,8 +271,9 @@ def test_an_interrupted_run_leaves_whole_files(tmp_path: Path, signal: str, code
     process.send_signal(getattr(__import__("signal"), f"SIG{signal}"))
     _, err = process.communicate(timeout=30)
     assert process.returncode == code
+    assert err.splitlines()[-1].startswith(f"ringlet: stopped by SIG{signal}; what is finished stays")
     assert "Traceback" not in err
-    assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["locks"]
+    assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["locks", "log.jsonl"]
 
 
 def test_json_knows_no_nan(capsys: pytest.CaptureFixture[str]) -> None:
