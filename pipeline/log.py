@@ -19,7 +19,7 @@ import resource
 import socket
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,6 +28,7 @@ from typing import Any, Literal
 from pipeline.errors import DONE, verdict
 
 Format = Literal["text", "json"]
+Record = dict[str, Any]
 
 _LARGEST = 4 << 20  # bytes of a log before it is put aside
 _KEPT = 3  # logs put aside
@@ -37,6 +38,7 @@ _QUIET_IN_TEXT = ("end", "run", "exit")
 _run = f"{socket.gethostname()}-{os.getpid()}-{time.time_ns():x}"
 _format: Format = "text"
 _files: list[Path] = []
+_sinks: list[Callable[[Record], None]] = []
 
 
 def use(format: Format) -> None:  # noqa: A002, the word of the option
@@ -55,13 +57,31 @@ def emit(stage: str, event: str, text: str, *, shown: bool = True, **figures: An
         "text": text,
         "memory_gb": round(_resident() / _GB, 3),
     }
-    line = json.dumps(record | figures, ensure_ascii=False, default=str)
+    replay(record | figures, shown=shown)
+
+
+def replay(record: Record, *, shown: bool = True) -> None:
+    """Say what was said in another process, with its own time, run and memory."""
+    if _sinks:
+        _sinks[-1](record)
+        return
+    line = json.dumps(record, ensure_ascii=False, default=str)
     if _format == "json":
         _print(line)
-    elif shown and event not in _QUIET_IN_TEXT:
-        _print(text if event == "error" else f"{stage}: {text}")
+    elif shown and record["event"] not in _QUIET_IN_TEXT:
+        _print(record["text"] if record["event"] == "error" else f"{record['stage']}: {record['text']}")
     for path in list(_files):
         _append(path, line)
+
+
+@contextmanager
+def forwarded_to(sink: Callable[[Record], None]) -> Iterator[None]:
+    """Hand all that is said in this block to `sink`, and to nobody else: for workers without a voice of their own."""
+    _sinks.append(sink)
+    try:
+        yield
+    finally:
+        _sinks.remove(sink)
 
 
 def error(text: str) -> None:

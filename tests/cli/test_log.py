@@ -123,6 +123,19 @@ def test_a_large_log_is_put_aside_and_the_oldest_goes(
     assert said == {"log.jsonl": "5", "log.1.jsonl": "4", "log.2.jsonl": "3", "log.3.jsonl": "2"}
 
 
+def test_what_a_worker_says_is_said_by_its_client(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    heard: list[dict[str, Any]] = []
+    with log.forwarded_to(heard.append), track("render", total=2, unit="frame") as bar:
+        say("render", "from afar")
+        bar.advance(2)
+    assert capsys.readouterr().err == ""
+    with log.kept_in(tmp_path / "log.jsonl"):
+        for record in heard:
+            log.replay(record)
+    assert records(tmp_path / "log.jsonl")[1:-1] == heard
+    assert capsys.readouterr().err.splitlines()[0] == "render: from afar"
+
+
 def _talk(path: Path, number: int) -> None:
     with log.kept_in(path):
         for line in range(200):
