@@ -119,7 +119,7 @@ def _make(
     everything: bool = False,
 ) -> None:
     """Make a stage and whatever it needs; `everything` also makes the stages before it that it does not need."""
-    from pipeline.cli.stages import NEEDS, Batch
+    from pipeline.batch.stages import NEEDS, Batch
     from pipeline.config import STAGES
 
     log.use(manner.log_format)

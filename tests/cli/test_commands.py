@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from pipeline import cache
+from pipeline.batch.stages import Batch
 from pipeline.cli.base import print_json
 from pipeline.cli.main import call
-from pipeline.cli.stages import Batch
 from pipeline.validation import Law, Outcome, Reading
 
 ROOT = Path(__file__).parents[2]
@@ -248,7 +248,7 @@ def test_an_interrupted_run_leaves_whole_files(tmp_path: Path, signal: str, code
         "import os, sys, time, numpy as np\n"
         "from pipeline import cache\n"
         "from pipeline.cli.main import main\n"
-        "from pipeline.cli.stages import Batch\n"
+        "from pipeline.batch.stages import Batch\n"
         "def execute(batch, stage, frames):\n"
         "    with cache.create(batch.file(stage), kind=stage, key=batch.keys[stage]) as writer:\n"
         "        writer.write('a', np.zeros(9))\n"
