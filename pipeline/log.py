@@ -117,6 +117,16 @@ def kept_in(path: Path) -> Iterator[None]:
             _files.remove(path)
 
 
+def records(path: Path) -> Iterator[Record]:
+    """What a log and those put aside before it tell, oldest first; lines that are not whole are passed over."""
+    for file in (*(_older(path, age) for age in range(_KEPT, 0, -1)), path):
+        if not file.exists():
+            continue
+        for line in file.read_text(encoding="utf-8", errors="replace").splitlines():
+            with suppress(ValueError):
+                yield json.loads(line)
+
+
 def peak_gb() -> float:
     """Most memory that this process has used so far [GB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / _GB
@@ -145,10 +155,14 @@ def _put_aside(path: Path) -> None:
     with suppress(OSError):
         if path.stat().st_size < _LARGEST:
             return
-        older = [path, *(path.with_suffix(f".{age}{path.suffix}") for age in range(1, _KEPT + 1))]
+        older = [path, *(_older(path, age) for age in range(1, _KEPT + 1))]
         for newer, name in zip(older[-2::-1], older[:0:-1], strict=True):
             if newer.exists():
                 newer.replace(name)
+
+
+def _older(path: Path, age: int) -> Path:
+    return path.with_suffix(f".{age}{path.suffix}")
 
 
 def _resident() -> int:
