@@ -1,10 +1,12 @@
-"""How far a long job is, on standard error: a bar on a terminal, a plain line every few seconds elsewhere."""
+"""How far a long job is: a bar on a terminal, a line every few seconds elsewhere and in the logs."""
 
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Protocol
+
+from pipeline import log
 
 HEARTBEAT_S = 5.0
 
@@ -17,39 +19,54 @@ class Bar(Protocol):
 
 
 def say(stage: str, message: str) -> None:
-    """Write one plain log line."""
-    print(f"{stage}: {message}", file=sys.stderr, flush=True)
+    """Say one line about a stage."""
+    log.emit(stage, "message", message)
+
+
+def warn(stage: str, message: str) -> None:
+    """Say one line that the run's report repeats: something is not as the user may think."""
+    log.emit(stage, "warning", message)
 
 
 @contextmanager
 def track(stage: str, total: int, unit: str = "frame") -> Iterator[Bar]:
     """Show the progress of `total` units; the last line tells the time that they took."""
     start = time.monotonic()
-    with _terminal_bar(stage, total) if sys.stderr.isatty() else _heartbeat(stage, total, unit) as bar:
-        yield bar
-    say(stage, f"{total} {unit}{'' if total == 1 else 's'} in {_clock(time.monotonic() - start)}")
+    drawn = _terminal_bar(stage, total) if sys.stderr.isatty() else nullcontext()
+    with drawn as bar:
+        yield _Heartbeat(stage, total, unit, bar)
+    seconds = time.monotonic() - start
+    text = f"{total} {unit}{'' if total == 1 else 's'} in {_clock(seconds)}"
+    log.emit(stage, "message", text, unit=unit, done=total, total=total, seconds=round(seconds, 3))
 
 
 class _Heartbeat:
-    def __init__(self, stage: str, total: int, unit: str) -> None:
-        self.stage, self.total, self.unit = stage, total, unit
+    def __init__(self, stage: str, total: int, unit: str, bar: Bar | None) -> None:
+        self.stage, self.total, self.unit, self.bar = stage, total, unit, bar
         self.done = 0
         self.start = self.last = time.monotonic()
 
     def advance(self, count: int = 1) -> None:
         self.done += count
+        if self.bar is not None:
+            self.bar.advance(count)
         now = time.monotonic()
         if now - self.last < HEARTBEAT_S or self.done >= self.total:
             return
         self.last = now
         rate = self.done / (now - self.start)
-        left = _clock((self.total - self.done) / rate)
-        say(self.stage, f"{self.unit} {self.done}/{self.total}, {rate:.3g} {self.unit}s/s, {left} left")
-
-
-@contextmanager
-def _heartbeat(stage: str, total: int, unit: str) -> Iterator[Bar]:
-    yield _Heartbeat(stage, total, unit)
+        left = (self.total - self.done) / rate
+        log.emit(
+            self.stage,
+            "progress",
+            f"{self.unit} {self.done}/{self.total}, {rate:.3g} {self.unit}s/s, {_clock(left)} left",
+            shown=self.bar is None,
+            unit=self.unit,
+            done=self.done,
+            total=self.total,
+            rate=rate,
+            left_s=round(left, 1),
+        )
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from pipeline.cache.experiment import Experiment
 from pipeline.cache.guides import GuidesReader, GuidesWriter, create_guides, open_guides
 from pipeline.cache.pictures import picture_record, write_picture
 from pipeline.cache.segments import Frame, Segments
+from pipeline.cache.sharing import Sharing
 from pipeline.cache.store import Missing, Reader, Writer, create, open
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Missing",
     "Reader",
     "Segments",
+    "Sharing",
     "Writer",
     "create",
     "create_guides",

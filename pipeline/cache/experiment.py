@@ -1,15 +1,12 @@
 """The folder of one experiment, outputs/<name>/: where its files are, and who is working on it."""
 
-import fcntl
-import os
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.cache.atomic import remove_stale
-from pipeline.progress import say
+from pipeline.cache.locks import holders, locked
 
 
 @dataclass(frozen=True)
@@ -38,24 +35,31 @@ class Experiment:
         """The folder of the pictures."""
         return self.folder / "frames"
 
+    @property
+    def log(self) -> Path:
+        """What its runs have said, as JSON lines (see pipeline/log.py)."""
+        return self.folder / "log.jsonl"
+
+    def files(self, stage: str) -> tuple[Path, ...]:
+        """The file of a stage before the render, then those that go with it."""
+        return {
+            "groom": (self.groom,),
+            "simulate": (self.guides, self.folder / "diagnostics.png"),
+            "interpolate": (self.strands,),
+        }[stage]
+
     @contextmanager
-    def working_on(self, stage: str) -> Iterator[None]:
+    def working_on(self, stage: str, frames: range | None = None) -> Iterator[None]:
         """Keep other processes away from a stage while it is made; waits, and says so, while one is at it.
 
-        The lock dies with its process. Temporary files of dead processes are removed on the way.
+        Of the render only from `frames`, if they are given: processes make different frames at once. The lock dies
+        with its process. Temporary files of dead processes are removed on the way.
         """
-        locks = self.folder / "locks"
-        locks.mkdir(parents=True, exist_ok=True)
-        with (locks / stage).open("a+") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                lock.seek(0)
-                say(stage, f"waiting for {lock.read() or 'another process'}, which makes {self.folder}")
-                fcntl.flock(lock, fcntl.LOCK_EX)
-            lock.truncate(0)
-            lock.write(f"process {os.getpid()} on {socket.gethostname()}")
-            lock.flush()
+        with locked(self.folder / "locks" / stage, stage, str(self.folder), frames):
             for folder in (self.folder, self.frames, self.guides.with_suffix(".segments")):
                 remove_stale(folder)
             yield
+
+    def workers_on(self, stage: str) -> list[str]:
+        """The processes that are making a stage at the moment, as "process 12 on host"."""
+        return holders(self.folder / "locks" / stage)

@@ -4,12 +4,14 @@ import importlib.metadata
 import json
 import math
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Group, Parameter
 
 from pipeline.errors import InputError
+from pipeline.log import Format
 
 if TYPE_CHECKING:
     from pipeline.cache import Experiment
@@ -24,6 +26,10 @@ app = App(
     name="ringlet",
     help="Batch hair pipeline: config -> groom -> simulate -> interpolate -> render.",
     help_format="plaintext",
+    help_epilogue=(
+        "Exit codes: 0 done; 1 a check failed; 2 wrong input, or too little disk or memory;\n"
+        "70 a fault of ringlet; 129, 130, 143 stopped by SIGHUP, SIGINT, SIGTERM."
+    ),
     version=lambda: importlib.metadata.version("ringlet"),
     suppress_keyboard_interrupt=False,
 )
@@ -43,6 +49,25 @@ Json = Annotated[
     bool, Parameter(name="--json", negative="", show_default=False, help="Print one JSON object.")
 ]
 ConfigFile = Annotated[Path, Parameter(help="A config, such as configs/default.toml.")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Manner:
+    """How a command that makes something goes about it, whatever it makes."""
+
+    log_format: Annotated[
+        Format,
+        Parameter(
+            env_var="RINGLET_LOG_FORMAT", help="Lines on standard error: plain text, or JSON for programs."
+        ),
+    ] = "text"
+    force: Annotated[
+        bool, Parameter(negative="", show_default=False, help="Begin even if memory may not suffice.")
+    ] = False
+
+
+AS_USUAL = Manner()
 
 FrameRange = Annotated[
     str, Parameter(show_default=False, help='Only these frames, counted from 1: "10-20", or one, "7".')

@@ -102,7 +102,7 @@ def export(
     outputs: Outputs = OUTPUTS,
 ) -> None:
     """Write strands in motion for other programs: metres, y up, widths as diameters."""
-    from pipeline.cli.stages import Batch
+    from pipeline.batch.stages import Batch
     from pipeline.export.export import export as write
 
     if strands is not None and strands < 1:

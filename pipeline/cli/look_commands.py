@@ -29,7 +29,7 @@ def status(
     json: Json = False,
 ) -> None:
     """Tell which stages are fresh, and which value made the others stale."""
-    from pipeline.cli.stages import Batch
+    from pipeline.batch.stages import Batch
 
     loaded = load_config(config, settings)
     states = Batch(loaded.config, experiment_of(loaded, outputs)).states()

@@ -5,11 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from pipeline import log
 from pipeline.cli.base import (
+    AS_USUAL,
     OUTPUTS,
     STAGES_GROUP,
     ConfigFile,
     FrameRange,
+    Manner,
     Outputs,
     Settings,
     app,
@@ -34,27 +37,34 @@ def run(
     frames: FrameRange = "",
     settings: Settings = (),
     outputs: Outputs = OUTPUTS,
+    manner: Manner = AS_USUAL,
 ) -> None:
     """Run all stages that are not fresh."""
-    _make(config, until, settings, outputs, frames, everything=True)
+    _make(config, until, settings, outputs, manner, frames, everything=True)
 
 
 @app.command(group=STAGES_GROUP, sort_key=2)
-def groom(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+def groom(
+    config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS, manner: Manner = AS_USUAL
+) -> None:
     """Stage 1: all strands at rest on the head."""
-    _make(config, "groom", settings, outputs)
+    _make(config, "groom", settings, outputs, manner)
 
 
 @app.command(group=STAGES_GROUP, sort_key=3)
-def simulate(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+def simulate(
+    config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS, manner: Manner = AS_USUAL
+) -> None:
     """Stage 2: the guides in motion."""
-    _make(config, "simulate", settings, outputs)
+    _make(config, "simulate", settings, outputs, manner)
 
 
 @app.command(group=STAGES_GROUP, sort_key=4)
-def interpolate(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+def interpolate(
+    config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS, manner: Manner = AS_USUAL
+) -> None:
     """Stage 3: which guides move which strand."""
-    _make(config, "interpolate", settings, outputs)
+    _make(config, "interpolate", settings, outputs, manner)
 
 
 @app.command(group=STAGES_GROUP, sort_key=5)
@@ -64,9 +74,10 @@ def render(
     frames: FrameRange = "",
     settings: Settings = (),
     outputs: Outputs = OUTPUTS,
+    manner: Manner = AS_USUAL,
 ) -> None:
     """Stage 4: the frames as PNG files."""
-    _make(config, "render", settings, outputs, frames)
+    _make(config, "render", settings, outputs, manner, frames)
 
 
 @app.command(group=STAGES_GROUP, sort_key=6)
@@ -103,22 +114,25 @@ def _make(
     stage: str,
     settings: tuple[str, ...],
     outputs: Path,
+    manner: Manner,
     frames: str = "",
     everything: bool = False,
 ) -> None:
     """Make a stage and whatever it needs; `everything` also makes the stages before it that it does not need."""
-    from pipeline.cli.stages import NEEDS, Batch
+    from pipeline.batch.stages import NEEDS, Batch
     from pipeline.config import STAGES
 
+    log.use(manner.log_format)
     if stage not in STAGES:
         raise InputError(f"--until {stage}: expected one of {', '.join(STAGES)}")
     loaded = load_config(config, settings)
     wanted = frame_range(frames, loaded.config.simulate.frames)
     batch = Batch(loaded.config, experiment_of(loaded, outputs))
     before = STAGES[: STAGES.index(stage)] if everything else NEEDS[stage]
-    for name in before:
-        batch.make(name, touch=everything)
-    batch.make(stage, wanted if stage == "render" else None)
+    with log.kept_in(batch.experiment.log):
+        for name in before:
+            batch.make(name, touch=everything)
+        batch.make(stage, wanted if stage == "render" else None)
 
 
 def _rendered(loaded: "Loaded", experiment: "Experiment") -> list[Path]:

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from pipeline.batch.stages import Batch
 from pipeline.cache import Experiment, replacing
-from pipeline.cli.stages import Batch
 from pipeline.config import STAGES, Loaded
 from pipeline.config.load import named_files
 

@@ -50,22 +50,40 @@ def load(path: Path, overrides: tuple[str, ...] = ()) -> Loaded:
     The name is the file's stem unless the file itself sets one: an experiment never shares a folder with
     the one that it extends. Raises InputError that tells everything wrong, one line each.
     """
+    tree, files = read_tree(path, overrides)
+    loaded, wrong = validated(tree, path, files)
+    if loaded is None:
+        raise InputError.joined(wrong)
+    return loaded
+
+
+def read_tree(path: Path, overrides: tuple[str, ...]) -> tuple[Tree, tuple[Path, ...]]:
+    """The values of a config file, of what it extends and of overrides, not yet validated; and the files read."""
     files: list[Path] = []
     tree = _read(path, files)
     for override in overrides:
         _override(tree, override)
-    missing = [message for key in _naming(tree.values, FILES) if (message := _resolve(tree, key))]
-    missing += [
-        message for key in _naming(tree.values, SEQUENCES) if (message := _resolve_sequence(tree, key))
-    ]
+    return tree, tuple(files)
+
+
+def validated(tree: Tree, path: Path, files: tuple[Path, ...]) -> tuple[Loaded | None, list[str]]:
+    """The config of a tree, whose paths become absolute; or None, and a line for each thing that is wrong."""
+    wrong = [message for key in _naming(tree.values, FILES) if (message := _resolve(tree, key))]
+    wrong += [message for key in _naming(tree.values, SEQUENCES) if (message := _resolve_sequence(tree, key))]
     try:
         config = Config.model_validate_json(json.dumps(tree.values, default=str), strict=True)
     except ValidationError as error:
-        raise InputError.joined(missing + complaints(error, tree, path)) from None
-    if missing:
-        raise InputError.joined(missing)
-    origins = {dotted(key): origin for key, origin in tree.origins.items()}
-    return Loaded(config, origins, tuple(files))
+        return None, wrong + complaints(error, tree, path)
+    if wrong:
+        return None, wrong
+    return Loaded(config, {dotted(key): origin for key, origin in tree.origins.items()}, files), []
+
+
+def set_value(tree: Tree, path: KeyPath, value: Any, origin: str, folder: Path) -> None:
+    """Set one value; names of files in it are relative to `folder`. Raises LookupError with a sentence."""
+    tree.set(path, value, origin, _defaults)
+    named = (key for key in _naming(tree.values, (*FILES, *SEQUENCES)) if key[: len(path)] == path)
+    tree.anchor |= dict.fromkeys(named, folder)
 
 
 def named_files(config: Config) -> dict[tuple[str, ...], tuple[Path, ...]]:
@@ -112,6 +130,8 @@ def _read(path: Path, files: list[Path]) -> Tree:
     values.setdefault("name", path.stem)
     own = Tree(values, lines)
     own.anchor = dict.fromkeys(_naming(values, (*FILES, *SEQUENCES)), path.parent)
+    if isinstance(values.get("sweep"), dict):
+        own.anchor |= {("sweep", key): path.parent for key in values["sweep"]}
     parent = values.pop("extends", None)
     if parent is None:
         return own
@@ -153,12 +173,9 @@ def _override(tree: Tree, override: str) -> None:
         raise InputError(f'-s {override}: expected key=value, such as -s "groom.style.waves.radius=9 mm"')
     path = parse_key(key.strip())
     try:
-        tree.set(path, _scalar(value.strip()), f"-s {dotted(path)}", _defaults)
+        set_value(tree, path, _scalar(value.strip()), f"-s {dotted(path)}", Path.cwd())
     except LookupError as error:
         raise InputError(f"-s {key.strip()}: {error.args[0]}") from None
-    tree.anchor |= dict.fromkeys(
-        (key for key in _naming(tree.values, (*FILES, *SEQUENCES)) if key[: len(path)] == path), Path.cwd()
-    )
 
 
 def _scalar(value: str) -> Any:

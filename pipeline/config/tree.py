@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,12 @@ class Tree:
     def __init__(self, values: dict[str, Any], origins: dict[KeyPath, str]) -> None:
         self.values, self.origins = values, origins
         self.anchor: dict[KeyPath, Path] = {}
+
+    def copy(self) -> "Tree":
+        """A tree of its own."""
+        tree = Tree(deepcopy(self.values), dict(self.origins))
+        tree.anchor = dict(self.anchor)
+        return tree
 
     def get(self, path: KeyPath) -> Any:
         """Return the value at a path, or None."""

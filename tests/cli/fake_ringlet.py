@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from pipeline import cache
+from pipeline.batch.stages import Batch
 from pipeline.cli.main import main
-from pipeline.cli.stages import Batch
 from pipeline.config import keys, provenance
 
 

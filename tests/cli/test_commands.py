@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from pipeline import cache
+from pipeline.batch.stages import Batch
 from pipeline.cli.base import print_json
 from pipeline.cli.main import call
-from pipeline.cli.stages import Batch
 from pipeline.validation import Law, Outcome, Reading
 
 ROOT = Path(__file__).parents[2]
@@ -238,7 +238,7 @@ def test_a_full_disk_ends_a_run_with_one_message_and_nothing_lost(tmp_path: Path
     assert result.returncode == 2
     assert "guides.h5: no room on the disk" in result.stderr
     assert "Traceback" not in result.stderr
-    assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["groom.h5", "locks"]
+    assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["groom.h5", "locks", "log.jsonl"]
 
 
 @pytest.mark.parametrize(("signal", "code"), [("INT", 130), ("TERM", 143)])
@@ -248,7 +248,7 @@ def test_an_interrupted_run_leaves_whole_files(tmp_path: Path, signal: str, code
         "import os, sys, time, numpy as np\n"
         "from pipeline import cache\n"
         "from pipeline.cli.main import main\n"
-        "from pipeline.cli.stages import Batch\n"
+        "from pipeline.batch.stages import Batch\n"
         "def execute(batch, stage, frames):\n"
         "    with cache.create(batch.file(stage), kind=stage, key=batch.keys[stage]) as writer:\n"
         "        writer.write('a', np.zeros(9))\n"
@@ -271,8 +271,9 @@ def test_an_interrupted_run_leaves_whole_files(tmp_path: Path, signal: str, code
     process.send_signal(getattr(__import__("signal"), f"SIG{signal}"))
     _, err = process.communicate(timeout=30)
     assert process.returncode == code
+    assert err.splitlines()[-1].startswith(f"ringlet: stopped by SIG{signal}; what is finished stays")
     assert "Traceback" not in err
-    assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["locks"]
+    assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["locks", "log.jsonl"]
 
 
 def test_json_knows_no_nan(capsys: pytest.CaptureFixture[str]) -> None:

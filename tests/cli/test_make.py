@@ -172,7 +172,8 @@ def test_editing_a_parent_reaches_the_child(project: Project) -> None:
 
 def test_several_experiments_at_once(project: Project) -> None:
     ran = project.make("-j4", "render", "curly", "ci-small")
-    assert sorted(ran) == sorted(ALL * 3)
+    # default and ci-small differ in nothing but their names: all but the frames, which tell them, is made once
+    assert sorted(ran) == sorted(ALL * 2 + ["render 1 2 3"])
     assert project.make("-j4", "render", "curly", "ci-small") == []
 
 

@@ -34,6 +34,7 @@ from pipeline.config.schema.style import (
     Trim,
     Wave,
 )
+from pipeline.config.schema.sweep import Sweep
 from pipeline.config.schema.varying import Varied, VariedAngle, VariedFraction, VariedLength
 
 __all__ = [
@@ -72,6 +73,7 @@ __all__ = [
     "Simulate",
     "Sphere",
     "Swatch",
+    "Sweep",
     "Trim",
     "Variation",
     "Varied",
@@ -98,6 +100,8 @@ class Config(Section):
     """Stage 3: which guides move which strand."""
     render: Render = Render()
     """Stage 4: the frames."""
+    sweep: Sweep | None = None
+    """Options with lists of values, one experiment for each combination: `ringlet sweep`."""
 
     @model_validator(mode="after")
     def _shutter_sees_motion(self) -> "Config":

@@ -2,11 +2,12 @@
 
 import importlib
 import os
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline import cache
+from pipeline import cache, log
 from pipeline.config import STAGES, Config, explain, stage_inputs, stage_keys
 from pipeline.progress import say
 
@@ -19,6 +20,7 @@ NEEDS = {
 _KINDS = {"groom": "groom", "simulate": "guides", "interpolate": "strands"}
 _REASONS_SHOWN = 3
 _CHANGES_SHOWN = 6
+_verified: dict[tuple[int, ...], str] = {}  # keys of files that this process has read whole
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Batch:
         self.config, self.experiment = config, experiment
         self.keys, self.inputs = stage_keys(config), stage_inputs(config)
         self.all_frames = range(1, config.simulate.frames + 1)
+        self.sharing = cache.Sharing(experiment)
 
     def states(self) -> list[State]:
         """Examine every stage, in order; every file is read whole and verified."""
@@ -50,7 +53,7 @@ class Batch:
         """Examine one stage; of the render, only some frames if they are given."""
         if stage == "render":
             return self._state_of_frames(frames or self.all_frames)
-        return State(stage, self._why_stale(stage) or "fresh")
+        return State(stage, self._why_stale(stage, self.file(stage)) or "fresh")
 
     def make(self, stage: str, frames: range | None = None, touch: bool = True) -> None:
         """Make one stage whose inputs are there, unless it is fresh.
@@ -59,16 +62,51 @@ class Batch:
         """
         state = self.state(stage, frames)
         if not state.fresh:
-            with self.experiment.working_on(stage):
+            with self.experiment.working_on(stage, frames):
                 state = self.state(stage, frames)  # another process may just have made it
                 if not state.fresh:
-                    say(stage, f"start ({state.reason})")
-                    self.execute(stage, state.frames)
+                    self._renew(stage, state)
+        elif stage != "render":
+            self.sharing.note(self.keys[stage])
         if touch and state.fresh:
             say(stage, "fresh")
         if touch:
             for path in self.outputs(stage, frames):
-                os.utime(path)
+                _touch(path)
+
+    def _renew(self, stage: str, state: State) -> None:
+        """Take the file from another experiment that has it, else make it."""
+        if stage == "render":
+            self._run(stage, state)
+            return
+        key = self.keys[stage]
+        with self.sharing.making(stage, key):
+            others = self.sharing.others(key)
+            other = next((each for each in others if not self._why_stale(stage, each.files(stage)[0])), None)
+            if other is None:
+                self._run(stage, state)
+            else:
+                say(stage, f"the same as that of {other.folder.name}")
+                self.sharing.take(stage, other)
+            self.sharing.note(key)
+
+    def _run(self, stage: str, state: State) -> None:
+        key, start = self.keys[stage], time.monotonic()
+        log.emit(
+            stage, "begin", f"start ({state.reason})", key=key, reason=state.reason, frames=len(state.frames)
+        )
+        self.execute(stage, state.frames)
+        seconds, peak = round(time.monotonic() - start, 3), round(log.peak_gb(), 3)
+        log.emit(stage, "end", f"made in {seconds} s", key=key, seconds=seconds, peak_gb=peak)
+
+    def seconds(self, stage: str) -> float | None:
+        """How long a stage has taken that is there; of the render all runs under its key, where the log tells of them."""
+        if stage != "render":
+            with cache.open(self.file(stage), _KINDS[stage]) as reader:
+                return float(reader.provenance["wall_time_s"])
+        records = [r for r in log.records(self.experiment.log) if r.get("key") == self.keys[stage]]
+        spent = [record["seconds"] for record in records if record["event"] == "end"]
+        return round(sum(spent), 3) if spent else None
 
     def execute(self, stage: str, frames: tuple[int, ...]) -> None:
         """Run the code of a stage; of the render, for these frames."""
@@ -78,8 +116,7 @@ class Batch:
 
     def file(self, stage: str) -> Path:
         """Return the file that a stage before the render leaves."""
-        folder = self.experiment
-        return {"groom": folder.groom, "simulate": folder.guides, "interpolate": folder.strands}[stage]
+        return self.experiment.files(stage)[0]
 
     def outputs(self, stage: str, frames: range | None = None) -> list[Path]:
         """List the files that a stage leaves."""
@@ -87,12 +124,14 @@ class Batch:
             return [self.file(stage)]
         return [self.experiment.frames / f"{number:04d}.png" for number in frames or self.all_frames]
 
-    def _why_stale(self, stage: str) -> str | None:
+    def _why_stale(self, stage: str, path: Path) -> str | None:
         try:
-            with cache.open(self.file(stage), _KINDS[stage]) as reader:
+            with cache.open(path, _KINDS[stage]) as reader:
                 if reader.key != self.keys[stage]:
                     return self._difference(stage, reader.provenance)
-                reader.verify()
+                if _identity(path) not in _verified:
+                    reader.verify()
+                    _verified[_identity(path)] = reader.key
                 return None
         except cache.Missing:
             return "not made yet"
@@ -111,7 +150,10 @@ class Batch:
         stale: dict[int, str] = {}
         for number, path in zip(frames, self.outputs("render", frames), strict=True):
             try:
+                if path.exists() and _verified.get(_identity(path)) == self.keys["render"]:
+                    continue
                 key, provenance = cache.picture_record(path)
+                _verified[_identity(path)] = key
                 if key != self.keys["render"]:
                     stale[number] = self._difference("render", provenance)
             except cache.Missing:
@@ -124,3 +166,17 @@ class Batch:
         if missing:
             reasons.append(f"{len(missing)} of {len(frames)} frames not made yet")
         return State("render", "; ".join(reasons), tuple(sorted([*missing, *stale])))
+
+
+def _identity(path: Path) -> tuple[int, ...]:
+    """What tells apart files, and states of a file, but for its name: experiments share files by hard links."""
+    status = path.stat()
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def _touch(path: Path) -> None:
+    """Give a file the current time, without having to verify it again."""
+    key = _verified.pop(_identity(path), None)
+    os.utime(path)
+    if key is not None:
+        _verified[_identity(path)] = key
