@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from pipeline.cli.base import CHECK_GROUP, Json, app, print_json
+from pipeline.cli.base import CHECK_GROUP, OUTPUTS, Json, Outputs, app, print_json
 from pipeline.errors import InputError
 
 Flag = Parameter(negative="", show_default=False)
@@ -198,11 +198,11 @@ def compare(
 
 
 @app.command(group=CHECK_GROUP)
-def doctor(*, json: Json = False) -> int:
-    """Check compiler, OpenGL, memory, disk and kernels; tell the command that brings what is missing."""
+def doctor(*, outputs: Outputs = OUTPUTS, json: Json = False) -> int:
+    """Check libraries, kernels, OpenGL, memory, disk, limits and clock; tell the command that mends each."""
     from pipeline.cli.doctor import examine
 
-    checks = examine()
+    checks = examine(outputs)
     passed = all(check.passed for check in checks)
     if json:
         print_json({"passed": passed, "checks": [asdict(check) for check in checks]})

@@ -42,18 +42,34 @@ def status(
 
 
 @app.command(group=LOOK_GROUP, sort_key=2)
-def plan(config: ConfigFile, *, settings: Settings = (), json: Json = False) -> None:
-    """Estimate memory, disk and time of every stage before anything runs."""
+def plan(
+    config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS, json: Json = False
+) -> None:
+    """Estimate memory, disk and time of every stage before anything runs, beside what is free here."""
+    from pipeline.cli.machine import GB, disk, memory, shortage
     from pipeline.cli.plan import estimate
 
     costs = estimate(load_config(config, settings).config)
+    stages = costs["stages"]
+    short = [text for name in stages if (text := shortage(name, stages[name]["peak_rss_gb"]))]
+    space = disk(outputs)
+    if costs["disk_gb"] * GB > space.free:
+        short.append(
+            f"{space.limit}: {costs['disk_gb']:.2f} GB are needed and {space.free / GB:.2f} GB are free"
+        )
+    free = {name: memory(name) for name in stages}
+    least = min(free.values(), key=lambda room: room.free)
     if json:
-        print_json(costs)
+        here = {"memory_gb": least.free / GB, "limit": least.limit, "disk_gb": space.free / GB}
+        print_json(costs | {"here": here, "short": short})
         return
     print(f"{'':<12} {'peak memory':>12} {'disk':>12} {'time':>12}")
-    for name, cost in {**costs["stages"], "in all": costs}.items():
-        disk, memory = f"{cost['disk_gb']:.3f} GB", f"{cost['peak_rss_gb']:.2f} GB"
-        print(f"{name:<12} {memory:>12} {disk:>12} {cost['seconds']:>10.0f} s")
+    for name, cost in {**stages, "in all": costs}.items():
+        taken, peak = f"{cost['disk_gb']:.3f} GB", f"{cost['peak_rss_gb']:.2f} GB"
+        print(f"{name:<12} {peak:>12} {taken:>12} {cost['seconds']:>10.0f} s")
+    print(f"{'free here':<12} {least.free / GB:>9.2f} GB {space.free / GB:>9.3f} GB   ({least.limit})")
+    for text in short:
+        print(text)
 
 
 @app.command(group=LOOK_GROUP, sort_key=3)

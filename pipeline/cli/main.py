@@ -11,7 +11,13 @@ from typing import NoReturn
 from cyclopts import CycloptsError
 
 from pipeline import log
-from pipeline.cli import check_commands, exchange_commands, look_commands, run_commands  # noqa: F401, they add their commands
+from pipeline.cli import (  # noqa: F401, they add their commands
+    check_commands,
+    completion,
+    exchange_commands,
+    look_commands,
+    run_commands,
+)
 from pipeline.cli.base import app
 from pipeline.errors import DONE, FAULT, WRONG_INPUT, Stopped, verdict
 

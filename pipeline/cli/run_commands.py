@@ -1,5 +1,6 @@
 """Commands that make something: run, one per stage, movie, sheet, and what make needs."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,6 +25,7 @@ from pipeline.errors import InputError
 
 if TYPE_CHECKING:
     from pipeline.cache import Experiment
+    from pipeline.batch.stages import Batch
     from pipeline.config import Loaded
 
 Stage = Annotated[str, Parameter(help="The last stage to run: groom, simulate, interpolate or render.")]
@@ -119,10 +121,13 @@ def _make(
     everything: bool = False,
 ) -> None:
     """Make a stage and whatever it needs; `everything` also makes the stages before it that it does not need."""
+    from pipeline.cli.machine import refuse_bare_start
+
+    log.use(manner.log_format)
+    refuse_bare_start()  # before anything large is loaded
     from pipeline.batch.stages import NEEDS, Batch
     from pipeline.config import STAGES
 
-    log.use(manner.log_format)
     if stage not in STAGES:
         raise InputError(f"--until {stage}: expected one of {', '.join(STAGES)}")
     loaded = load_config(config, settings)
@@ -130,9 +135,23 @@ def _make(
     batch = Batch(loaded.config, experiment_of(loaded, outputs))
     before = STAGES[: STAGES.index(stage)] if everything else NEEDS[stage]
     with log.kept_in(batch.experiment.log):
+        if not manner.force:
+            _refuse_what_does_not_fit(batch, (*before, stage), wanted)
         for name in before:
             batch.make(name, touch=everything)
         batch.make(stage, wanted if stage == "render" else None)
+
+
+def _refuse_what_does_not_fit(batch: "Batch", stages: Sequence[str], frames: range | None) -> None:
+    """Refuse, before anything runs, when a stage that has to be made is planned to need more memory than is free."""
+    from pipeline.cli.machine import shortage
+    from pipeline.cli.plan import estimate
+
+    costs = estimate(batch.config)["stages"]
+    for stage in stages:
+        short = shortage(stage, costs[stage]["peak_rss_gb"])
+        if short and not batch.state(stage, frames).fresh:
+            raise InputError(f"ringlet: {short}")
 
 
 def _rendered(loaded: "Loaded", experiment: "Experiment") -> list[Path]:
