@@ -24,8 +24,8 @@ from pipeline.cli.base import (
 from pipeline.errors import InputError
 
 if TYPE_CHECKING:
-    from pipeline.cache import Experiment
     from pipeline.batch.stages import Batch
+    from pipeline.cache import Experiment
     from pipeline.config import Loaded
 
 Stage = Annotated[str, Parameter(help="The last stage to run: groom, simulate, interpolate or render.")]
