@@ -7,18 +7,17 @@ the progressive order and are made first. So any chunking gives the same strands
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Config
-from pipeline.groom.combing import Combing, comb, tangential
+from pipeline.groom.combing import MOST_CROWDED, comb, tangential
 from pipeline.groom.heads import Head
 from pipeline.groom.partings import partings_of
 from pipeline.groom.repairs import pushed_out
-from pipeline.groom.roots import place_roots
+from pipeline.groom.roots import Factor, place_roots
 from pipeline.groom.style.gather import held_in_rings
 from pipeline.groom.style.ground import Ground, Terrain
 from pipeline.groom.style.hair import LONGEST, Hair, bristles, unit
@@ -45,9 +44,8 @@ class Style:
         self.partings = partings_of(config, head)
         combing = comb(head, self.partings)
         self.terrain = Terrain(skin, skin.guarded(), combing)
-        density = partial(_density, head, combing)
-        found, _ = place_roots(self.groom.strands, self.seed, skin, density, head.region)
-        self.roots, self.normals = (np.asarray(a, np.float64) for a in head.project(found))
+        density = (Factor(combing.crowding, MOST_CROWDED), Factor(head.density, 1.0))
+        self.roots, self.normals = place_roots(self.groom.strands, self.seed, head, density)
         placed = head.to_world(self.roots).astype(np.float32).astype(np.float64)  # as stages will see them
         ground = Ground(self.seed, self.groom.points, self.terrain, head)
         self.stack = Stack(self.groom.style, ground, self._bristles, Neighbours(placed, self.partings))
@@ -107,8 +105,3 @@ class Style:
         clearance = np.full(points.shape[1], _CLEARANCE)
         clearance[:2] = -np.inf, 0.5 * _CLEARANCE
         return self.terrain.skin.outside(points, clearance, rounds=2)[0]
-
-
-def _density(head: Head, combing: Combing, p: Vectors) -> Vectors:
-    """Relative density of roots at points on the skin."""
-    return np.asarray(head.density(p) * combing.crowding(p), np.float64)
