@@ -8,7 +8,6 @@ that partings shut off from all middles is in no clump.
 from collections.abc import Mapping
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from pipeline.groom.style.hair import Index, Vectors
