@@ -12,6 +12,7 @@ the flow up some way from it, on its own side.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ _APART = 0.015  # of the chart: roots look the flow up as if they stood this far
 _NEAR = 0.01  # [m] from a parting: that far no standoff reaches
 _APART_FROM = 0.15  # of the chart: but less and less this near to an end of it
 _CROWDING, _CROWDED = 0.7, 0.015  # more roots at a parting than elsewhere, over this distance [m]
+MOST_CROWDED = 1 + _CROWDING
 _SWIRL, _SWIRLED = 1.1, 0.018  # [rad] turn about an end of a parting, [m] how far it reaches
 _WHORL = 0.35  # [rad] turn of the flow about the whorl where there is no parting
 _BLOCK = 8192
@@ -53,7 +55,7 @@ class Combing:
 
     def flow(self, points: Points, normals: Points, standoff: Vectors) -> Vectors:
         """Unit directions of the combing (N, 3) in the planes of the normals (N, 3), for strands with these standoffs."""
-        v = self._at(self.chart.uv(points) + standoff)[:, :3]
+        v = _looked_up(self.grid, self.chart.uv(points) + standoff)[:, :3]
         return _unit(tangential(v, normals))
 
     def crowding(self, points: Points) -> Vectors:
@@ -62,7 +64,7 @@ class Combing:
 
     def distance(self, points: Points) -> Vectors:
         """Distance (N,) [m] from the nearest parting, 1 without any."""
-        return self._at(self.chart.uv(points))[:, 3]
+        return _looked_up(self._apart, self.chart.uv(points))[:, 0]
 
     def standoff(self, roots: Points) -> Vectors:
         """What is added to the chart points of a strand where it looks the flow up (N, 2), from its root (N, 3)."""
@@ -70,7 +72,7 @@ class Combing:
         found = np.zeros_like(uv)
         if not len(self.segments):
             return found
-        near = np.flatnonzero(self._at(uv)[:, 3] < _NEAR)
+        near = np.flatnonzero(_looked_up(self._apart, uv)[:, 0] < _NEAR)
         found[near] = self._standing_off(uv[near])
         return found
 
@@ -97,16 +99,10 @@ class Combing:
             return np.full(len(uv), np.inf)
         return np.asarray(np.linalg.norm(uv[:, None] - ends, axis=2).min(axis=1))
 
-    def _at(self, uv: Vectors) -> Vectors:
-        """The grid's values (N, 4) at chart points, bilinearly."""
-        last = self.grid.shape[0] - 1
-        place = np.clip((uv + 1) * (last / 2), 0, last - 1e-9)
-        i = place.astype(np.int64)
-        u, v = (place - i).T[..., None]
-        flat, at = self.grid.reshape(-1, 4), i[:, 0] * (last + 1) + i[:, 1]
-        low = flat[at] * (1 - v) + flat[at + 1] * v
-        high = flat[at + last + 1] * (1 - v) + flat[at + last + 2] * v
-        return np.asarray(low * (1 - u) + high * u)
+    @cached_property
+    def _apart(self) -> NDArray[np.float32]:
+        """(U, V, 1) [m]: the grid's distances from partings."""
+        return np.ascontiguousarray(self.grid[..., 3:])
 
 
 def comb(head: Head, partings: Partings) -> Combing:
@@ -160,6 +156,18 @@ def _ends(segments: Vectors) -> Vectors:
         return np.zeros((0, 2))
     points, count = np.unique(segments.reshape(-1, 2), axis=0, return_counts=True)
     return np.asarray(points[count == 1])
+
+
+def _looked_up(grid: NDArray[np.float32], uv: Vectors) -> Vectors:
+    """Values (N, K) of a grid (U, U, K) over the chart at chart points (N, 2), bilinearly."""
+    last = grid.shape[0] - 1
+    place = np.clip((uv + 1) * (last / 2), 0, last - 1e-9)
+    i = place.astype(np.int64)
+    u, v = (place - i).T[..., None]
+    flat, at = grid.reshape(-1, grid.shape[2]), i[:, 0] * (last + 1) + i[:, 1]
+    low = flat[at] * (1 - v) + flat[at + 1] * v
+    high = flat[at + last + 1] * (1 - v) + flat[at + last + 2] * v
+    return np.asarray(low * (1 - u) + high * u)
 
 
 def tangential(v: NDArray[Any], n: Points) -> Vectors:

@@ -85,13 +85,24 @@ def load_poses(
 
 def zero_surface(values: NDArray[Any]) -> tuple[Points, NDArray[np.int32]]:
     """Where values (nx, ny, nz), negative inside, are zero: points (V, 3) in nodes, triangles (T, 3) wound outwards."""
-    import pyvista as pv
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
-    grid = pv.ImageData(dimensions=values.shape)
-    grid["values"] = values.ravel(order="F")
-    found = grid.contour([0.0], scalars="values", method="flying_edges", compute_normals=False)
+    grid = vtkImageData()
+    grid.SetDimensions(*values.shape)
+    grid.GetPointData().SetScalars(numpy_to_vtk(values.ravel(order="F"), deep=True))
+    contour = vtkFlyingEdges3D()
+    contour.SetInputData(grid)
+    contour.SetValue(0, 0.0)
+    contour.ComputeNormalsOff()
+    contour.ComputeScalarsOff()
+    contour.Update()
+    found = contour.GetOutput()
+    triangles = vtk_to_numpy(found.GetPolys().GetConnectivityArray()).reshape(-1, 3)
     # Flying edges winds inwards where the inside is negative.
-    return np.asarray(found.points, float), np.ascontiguousarray(found.regular_faces[:, ::-1], np.int32)
+    points = vtk_to_numpy(found.GetPoints().GetData()).astype(float)
+    return points, np.ascontiguousarray(triangles[:, ::-1], np.int32)
 
 
 def _checked(path: Path, file: MeshFile) -> tuple[Points, Faces]:

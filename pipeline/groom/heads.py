@@ -91,7 +91,7 @@ class Head:
         return scalp.on_skin(self.fitted_field, uv)
 
     def density(self, p: Points) -> Points:
-        """Relative density of roots at fitted points on the skin; see `Region.density`."""
+        """Relative density of roots at fitted points on the skin, 0 to 1; see `Region.density`."""
         return self.region.density(self, p)
 
     def uv(self, p: Points) -> NDArray[np.float64]:

@@ -7,18 +7,17 @@ the progressive order and are made first. So any chunking gives the same strands
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Config
-from pipeline.groom.combing import Combing, comb, tangential
+from pipeline.groom.combing import MOST_CROWDED, comb, tangential
 from pipeline.groom.heads import Head
 from pipeline.groom.partings import partings_of
 from pipeline.groom.repairs import pushed_out
-from pipeline.groom.roots import place_roots
+from pipeline.groom.roots import Factor, place_roots
 from pipeline.groom.style.gather import held_in_rings
 from pipeline.groom.style.ground import Ground, Terrain
 from pipeline.groom.style.hair import LONGEST, Hair, bristles, unit
@@ -34,6 +33,7 @@ Vectors = NDArray[np.float64]
 _WORKERS = 2
 _CLEARANCE = 0.8e-3  # [m] between strands and skin
 _KEY = 7  # salt
+_STRIPS = 20  # across half the chart
 
 
 class Style:
@@ -43,11 +43,12 @@ class Style:
         self.groom, self.seed, self.head = config.groom, config.seed, head
         skin = head.fitted_field
         self.partings = partings_of(config, head)
-        combing = comb(head, self.partings)
-        self.terrain = Terrain(skin, skin.guarded(), combing)
-        density = partial(_density, head, combing)
-        found, _ = place_roots(self.groom.strands, self.seed, skin, density, head.region)
-        self.roots, self.normals = (np.asarray(a, np.float64) for a in head.project(found))
+        with ThreadPoolExecutor(1) as beside:
+            wall = beside.submit(skin.guarded)
+            combing = comb(head, self.partings)
+            self.terrain = Terrain(skin, wall.result(), combing)
+        density = (Factor(combing.crowding, MOST_CROWDED), Factor(head.density, 1.0))
+        self.roots, self.normals = place_roots(self.groom.strands, self.seed, head, density)
         placed = head.to_world(self.roots).astype(np.float32).astype(np.float64)  # as stages will see them
         ground = Ground(self.seed, self.groom.points, self.terrain, head)
         self.stack = Stack(self.groom.style, ground, self._bristles, Neighbours(placed, self.partings))
@@ -65,19 +66,28 @@ class Style:
     def strands(self, first: int, count: int = CHUNK) -> Strands:
         """Up to `count` strands from `first` on, in world coordinates."""
         index = np.arange(first, min(first + count, len(self.roots)))
-        hair = self.stack.strands(index)
+        beside = index[
+            self._by_place(index)
+        ]  # strands beside each other read the same parts of skin and combing
+        hair = self.stack.strands(beside)
         points = hair.points
-        points[:, 0] = self.roots[index]
+        points[:, 0] = self.roots[beside]
         points = self._evened(points)
         held = held_ends(np.tile([2, 0], (len(index), 1)), self.groom.points)
         if hair.ties is not None:
             held[held_in_rings(points, hair.ties)] = HEAD
+        order = np.argsort(beside)
         return Strands(
-            points=self.head.to_world(points).astype(np.float32),
-            held=held,
+            points=self.head.to_world(points).astype(np.float32)[order],
+            held=held[order],
             normal=self.normals[index].astype(np.float32),
             key=hashed(self.seed, index, _KEY),
         )
+
+    def _by_place(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
+        """An order (N,) of some strands in which neighbours are near each other: strip by strip of the chart."""
+        uv = self.head.fitted_chart.uv(self.roots[index])
+        return np.argsort(np.round(uv[:, 0] * _STRIPS) * 4 + uv[:, 1], kind="stable")
 
     def _bristles(self, index: NDArray[np.int64]) -> Hair:
         root, normal = self.roots[index], self.normals[index]
@@ -107,8 +117,3 @@ class Style:
         clearance = np.full(points.shape[1], _CLEARANCE)
         clearance[:2] = -np.inf, 0.5 * _CLEARANCE
         return self.terrain.skin.outside(points, clearance, rounds=2)[0]
-
-
-def _density(head: Head, combing: Combing, p: Vectors) -> Vectors:
-    """Relative density of roots at points on the skin."""
-    return np.asarray(head.density(p) * combing.crowding(p), np.float64)

@@ -13,6 +13,7 @@ body/points (F, V, 3) f32 [m], pose (F, 4, 4)     the head in motion, where ther
 """
 
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,9 +24,9 @@ from numpy.typing import NDArray
 from pipeline import cache
 from pipeline.cache.partings import write_partings
 from pipeline.config import Config, provenance
-from pipeline.config.schema import Contact
+from pipeline.config.schema import Contact, Groom
 from pipeline.groom.body import BodyFrame, body_frames
-from pipeline.groom.guides import choose_guides, looked_at, shut_in
+from pipeline.groom.guides import Choice, choose_guides, looked_at, shut_in
 from pipeline.groom.head_field import Field
 from pipeline.groom.heads import Head, make_head
 from pipeline.groom.partings import partings_of
@@ -48,8 +49,7 @@ def execute(config: Config, experiment: cache.Experiment, key: str) -> None:
             _write_head(writer, head)
             _write_body(writer, body_frames(config, head))
         write_partings(writer, source.partings)
-        points, roots = _write_strands(writer, source, looked_at(config.groom.guides))
-        choice = choose_guides(points, config.groom.guides, source.partings, config.groom.guide_error)
+        points, roots, choice = _write_strands(writer, source, config.groom)
         more = shut_in(choice.strand, roots, source.partings)
         chosen = np.sort(np.concatenate([choice.strand, more]))
         writer.write("guides/strand", chosen)
@@ -126,22 +126,34 @@ def _pinned(config: Config, chunks: Iterable[Strands]) -> Iterator[Strands]:
 
 
 def _write_strands(
-    writer: cache.Writer, source: Source, kept: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Stream the strands to the file; returns points of the first `kept`, to choose guides from, and all roots."""
+    writer: cache.Writer, source: Source, options: Groom
+) -> tuple[NDArray[np.float32], NDArray[np.float32], Choice]:
+    """Stream the strands to the file; returns points of the first ones, all roots, and the guides among the first.
+
+    Guides are chosen while later strands are made.
+    """
     columns: dict[str, cache.columns.ColumnWriter] = {}
     points: list[NDArray[np.float32]] = []
     roots: list[NDArray[np.float32]] = []
-    with track("groom", source.count, "strand") as bar:
+    kept = min(looked_at(options.guides), source.count)
+
+    def chosen() -> Choice:
+        return choose_guides(np.concatenate(points), options.guides, source.partings, options.guide_error)
+
+    with ThreadPoolExecutor(1) as beside, track("groom", source.count, "strand") as bar:
+        choice: Future[Choice] | None = None
         for strands in source.chunks:
             columns = columns or _columns(writer, strands.points.shape[1])
             for name, column in columns.items():
                 column.append(getattr(strands, name))
-            points.append(strands.points[:kept])
             roots.append(strands.points[:, 0].copy())
-            kept -= len(points[-1])
+            if choice is None:
+                points.append(strands.points[:kept])
+                kept -= len(points[-1])
+                choice = None if kept else beside.submit(chosen)
             bar.advance(len(strands))
-    return np.concatenate(points), np.concatenate(roots)
+        assert choice is not None  # sources tell their count
+        return np.concatenate(points), np.concatenate(roots), choice.result()
 
 
 def _guide_points(

@@ -15,7 +15,7 @@ from pipeline.groom import stage
 from pipeline.groom.head.distance import distance
 from pipeline.groom.heads import Head
 from pipeline.groom.procedural import Style
-from pipeline.groom.roots import place_roots
+from pipeline.groom.roots import Factor, place_roots
 from pipeline.groom.swatch import swatch
 from pipeline.strands.random import normal, uniform
 from pipeline.strands.strands import Strands
@@ -95,9 +95,7 @@ def test_every_prefix_of_roots_is_more_even_than_white_noise(mannequin: Head, wa
         return float(found.mean()), float(np.percentile(found, 5))
 
     # One in thirty of a regular sequence, by chance: nothing of its order is left.
-    chance, _ = place_roots(
-        1000, 3, mannequin.fitted_field, lambda p: mannequin.density(p) / 30, mannequin.region
-    )
+    chance, _ = place_roots(1000, 3, mannequin, [Factor(lambda p: mannequin.density(p) / 30, 1.0)])
     for count in (100, 300, 1000):
         (mean, closest), (white, white_closest) = nearest(wavy.points[:count, 0]), nearest(chance[:count])
         print(
@@ -110,16 +108,10 @@ def test_every_prefix_of_roots_is_more_even_than_white_noise(mannequin: Head, wa
 
 def test_roots_follow_the_wanted_density(mannequin: Head) -> None:
     """Twice the density on one half of the head gives twice the roots there."""
-    skin = mannequin.fitted_field
 
     def share(weight: float) -> float:
-        roots, _ = place_roots(
-            4000,
-            1,
-            skin,
-            lambda p: mannequin.density(p) * np.where(p[:, 0] > 0, 1.0, weight),
-            mannequin.region,
-        )
+        left = Factor(lambda p: np.where(p[:, 0] > 0, 1.0, weight), 1.0)
+        roots, _ = place_roots(4000, 1, mannequin, [left, Factor(mannequin.density, 1.0)])
         return float((roots[:, 0] > 0).mean())
 
     even, double = share(1.0), share(0.5)

@@ -134,10 +134,10 @@ def test_memory_does_not_grow_with_the_count(tmp_path: Path, monkeypatch: pytest
         return found
 
     peak(1)  # imports
-    few, many = peak(4), peak(40)
-    with cache.open(tmp_path / "40/groom.h5", "groom") as r:
-        assert r["strands/points"].shape[0] == 40_000
+    few, many = peak(20), peak(60)  # guides are chosen while strands go on being written
+    with cache.open(tmp_path / "60/groom.h5", "groom") as r:
+        assert r["strands/points"].shape[0] == 60_000
     print(
-        f"4,000 strands: {few / 1e6:.1f} MB, 40,000: {many / 1e6:.1f} MB; their points: {40 * chunk.points.nbytes / 1e6:.1f} MB"
+        f"20,000 strands: {few / 1e6:.1f} MB, 60,000: {many / 1e6:.1f} MB; their points: {60 * chunk.points.nbytes / 1e6:.1f} MB"
     )
-    assert many < few + 0.2 * 36 * chunk.points.nbytes
+    assert many < few + 0.2 * 40 * chunk.points.nbytes

@@ -31,8 +31,9 @@ def distance(p: Points, reach: float = np.inf) -> Distances:
 def value_and_gradient(p: Points, reach: float = np.inf, eps: float = 3e-4) -> tuple[Distances, Points]:
     """Distance (N,) and its gradient (N, 3), by differences on the corners of a tetrahedron of size `eps` [m]."""
     corners = np.array([[1, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]], float)
-    d = [distance(p + eps * corner, reach) for corner in corners]
-    return np.asarray(sum(d)) / 4, np.stack(d, -1) @ corners / (4 * eps)
+    a, b, c, d = (distance(p + eps * corner, reach) for corner in corners)
+    gradient = np.stack([a - b - c + d, c + d - a - b, b + d - a - c], axis=-1) / (4 * eps)
+    return (a + b + c + d) / 4, gradient
 
 
 def foot(p: Points, steps: int = 2, reach: float = np.inf) -> tuple[Points, Points]:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import zoom
 
 from pipeline.groom.head.distance import Distances, distance, norm, value_and_gradient
 from pipeline.groom.head.table import load_table
@@ -51,12 +50,21 @@ def _field(axes: Axes, reach: float = REACH) -> Distances:
     shape = [len(a) for a in axes]
     small = [a[::COARSE] for a in axes]
     d = distance(_lattice(small)).reshape([len(a) for a in small])
-    d = np.asarray(zoom(d, np.divide(shape, d.shape), order=1))
+    for axis, count in enumerate(shape):
+        d = _stretched(d, axis, count)
     near = np.flatnonzero(np.abs(d) < reach)
     at = np.unravel_index(near, shape)
     p = np.stack([a[i] for a, i in zip(axes, at, strict=True)], -1).astype(np.float32)
     d.reshape(-1)[near] = distance(p, 1.5 * reach)
     return d
+
+
+def _stretched(d: Distances, axis: int, count: int) -> Distances:
+    """A grid with `count` nodes along an axis, linear between those of d; its ends stay."""
+    place = np.arange(count) * ((d.shape[axis] - 1) / (count - 1))
+    node = np.minimum(place.astype(np.int64), d.shape[axis] - 2)
+    part = np.expand_dims(place - node, [k for k in range(d.ndim) if k != axis])
+    return np.asarray(np.take(d, node, axis) * (1 - part) + np.take(d, node + 1, axis) * part)
 
 
 def _lattice(axes: Axes) -> NDArray[np.float32]:

@@ -32,7 +32,7 @@ from pipeline.groom.style.gather import gathered
 from pipeline.groom.style.ground import Ground
 from pipeline.groom.style.hair import Hair, Index, Middles, divided
 from pipeline.groom.style.lengths import lengthened
-from pipeline.groom.style.locks import Locks
+from pipeline.groom.style.locks import Locks, all_locks
 from pipeline.groom.style.trim import trimmed
 from pipeline.groom.style.wave import waved
 from pipeline.strands.partings import Neighbours
@@ -97,8 +97,7 @@ class Stack:
 
     def _through(self, index: Index, steps: int) -> Hair:
         hair = self._start(index)
-        locks = {name: found.of(index) for name, found in self._locks.items()}
-        hair = replace(hair, locks=locks)
+        hair = replace(hair, locks=all_locks(self._locks, index))
         for name, op in self._steps[:steps]:
             if not isinstance(op, GROW_ANEW):
                 hair = divided(hair)
