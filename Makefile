@@ -69,7 +69,7 @@ include $(WANTED:%=outputs/%/targets.mk)
 $(filter-out render movie sheet,$(WANTED)): %: outputs/%
 endif
 
-.PHONY: render movie sheet
+.PHONY: render movie sheet turntable
 render: $(if $(NAME),outputs/$(NAME)) ## frames of CONFIG (configs/default.toml): make render CONFIG=configs/curly.toml
 
 movie: render ## the frames of CONFIG as one movie
@@ -77,6 +77,9 @@ movie: render ## the frames of CONFIG as one movie
 
 sheet: render ## the frames of CONFIG on one page
 	@$(RINGLET) sheet $(CONFIG)
+
+turntable: $(ENV) $(KERNELS) ## once around the hair of CONFIG at rest, as a movie: outputs/<name>-turntable
+	@$(RINGLET) turntable $(CONFIG)
 
 # --- Checks --------------------------------------------------------------------------------------
 

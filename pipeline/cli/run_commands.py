@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pipeline.cache import Experiment
     from pipeline.config import Loaded
 
+_CODEC = "h264 (.mp4), av1 (.av1.mp4) or ffv1 (.mkv, lossless, all bits of the frames)."
 Stage = Annotated[str, Parameter(help="The last stage to run: groom, simulate, interpolate or render.")]
 
 
@@ -83,13 +84,19 @@ def render(
 
 
 @app.command(group=STAGES_GROUP, sort_key=6)
-def movie(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+def movie(
+    config: ConfigFile,
+    *,
+    codec: Annotated[Literal["h264", "av1", "ffv1"] | None, Parameter(help=_CODEC)] = None,
+    settings: Settings = (),
+    outputs: Outputs = OUTPUTS,
+) -> None:
     """Put the frames together: an .mp4 where PyAV is installed, else an animated PNG."""
     from pipeline.render.movie import write_movie
 
     loaded = load_config(config, settings)
     experiment = experiment_of(loaded, outputs)
-    print(write_movie(_rendered(loaded, experiment), experiment.folder, loaded.config.simulate.fps))
+    print(write_movie(_rendered(loaded, experiment), experiment.folder, loaded.config.simulate.fps, codec))
 
 
 @app.command(group=STAGES_GROUP, sort_key=7)
@@ -103,6 +110,34 @@ def sheet(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUT
 
 
 @app.command(group=STAGES_GROUP, sort_key=8)
+def turntable(
+    config: ConfigFile,
+    *,
+    frames: Annotated[int, Parameter(help="Frames of one turn.")] = 72,
+    codec: Annotated[Literal["h264", "av1", "ffv1"] | None, Parameter(help=_CODEC)] = None,
+    settings: Settings = (),
+    outputs: Outputs = OUTPUTS,
+    manner: Manner = AS_USUAL,
+) -> None:
+    """Go once around the hair while the head holds still, as a movie: all stages, in outputs/<name>-turntable."""
+    from pipeline.render.movie import write_movie
+
+    name = load_config(config, settings).config.name
+    around = (
+        f"name={name}-turntable",
+        f"simulate.frames={frames}",
+        "simulate.motion={}",
+        'scene.camera.turntable="1 turn"',
+        "scene.camera.keyframes=[]",
+    )
+    settings = (*around, *settings)
+    _make(config, "render", settings, outputs, manner, everything=True)
+    loaded = load_config(config, settings)
+    experiment = experiment_of(loaded, outputs)
+    print(write_movie(_rendered(loaded, experiment), experiment.folder, loaded.config.simulate.fps, codec))
+
+
+@app.command(group=STAGES_GROUP, sort_key=9)
 def keys(config: ConfigFile, *, outputs: Outputs = OUTPUTS) -> None:
     """Write the stamps and rules that make reads: outputs/<name>/keys/ and targets.mk."""
     from pipeline.cli.stamps import write_stamps

@@ -1,6 +1,6 @@
 """Interface of the C++ kernels. Each room has its section; see the headers for the formulas."""
 
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -778,12 +778,14 @@ def average(samples: NDArray[np.uint8], per_side: int, decode: _F32) -> _F32:
 
     """
 
-def develop(linear: _F32, encode: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
-    """Pixels (H, W, 3) uint8 of linear ones (H, W, 3) float32.
+_Code = TypeVar("_Code", np.uint8, np.uint16)
+
+def develop(linear: _F32, encode: NDArray[_Code], scale: float) -> NDArray[_Code]:
+    """Pixels (H, W, 3), uint8 or uint16 as `encode` is, of linear ones (H, W, 3) float32.
 
     Args:
         linear: of any size; below 0 they are black.
-        encode: (K,) uint8, byte for scale * linear value, rounded down; values beyond the last entry take it.
+        encode: (K,), the code of scale * linear value, rounded down; values beyond the last entry take it.
         scale: >= 0.
 
     """

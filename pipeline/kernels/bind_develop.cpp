@@ -18,13 +18,14 @@ static nb::ndarray<nb::numpy, float> average_samples(Array<const uint8_t, -1, -1
     return pixels;
 }
 
-static nb::ndarray<nb::numpy, uint8_t> develop_pixels(Array<const float, -1, -1, 3> linear, Array<const uint8_t, -1> encode,
-                                                      float scale) {
+template <class Code>
+static nb::ndarray<nb::numpy, Code> develop_pixels(Array<const float, -1, -1, 3> linear, Array<const Code, -1> encode,
+                                                   float scale) {
     require(encode.shape(0) >= 1 && encode.shape(0) < size_t(1) << 24, "develop: expected 1 to 2^24 entries in encode");
     require(scale >= 0, "develop: expected a scale >= 0");
-    auto pixels = new_array<uint8_t>({linear.shape(0), linear.shape(1), size_t(3)});
-    const ToneCurve tone{encode.data(), int(encode.shape(0)), scale};
-    uint8_t *out = pixels.data();
+    auto pixels = new_array<Code>({linear.shape(0), linear.shape(1), size_t(3)});
+    const ToneCurve<Code> tone{encode.data(), int(encode.shape(0)), scale};
+    Code *out = pixels.data();
     nb::gil_scoped_release release;
     develop(linear.data(), out, linear.size(), tone, threads());
     return pixels;
@@ -32,7 +33,8 @@ static nb::ndarray<nb::numpy, uint8_t> develop_pixels(Array<const float, -1, -1,
 
 void bind_develop(nb::module_ &m) {
     m.def("average", &average_samples, nb::arg("samples"), nb::arg("per_side"), nb::arg("decode"));
-    m.def("develop", &develop_pixels, nb::arg("linear"), nb::arg("encode"), nb::arg("scale"));
+    m.def("develop", &develop_pixels<uint8_t>, nb::arg("linear"), nb::arg("encode").noconvert(), nb::arg("scale"));
+    m.def("develop", &develop_pixels<uint16_t>, nb::arg("linear"), nb::arg("encode").noconvert(), nb::arg("scale"));
 }
 
 } // namespace ringlet

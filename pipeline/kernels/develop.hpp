@@ -1,4 +1,4 @@
-// From samples in the framebuffer to linear pixels, and from linear pixels to bytes.
+// From samples in the framebuffer to linear pixels, and from linear pixels to those of a file.
 #pragma once
 
 #include <algorithm>
@@ -25,18 +25,19 @@ inline void average(const uint8_t *samples, float *pixels, size_t H, size_t W, i
     }
 }
 
-/// What bytes stand for linear values: the byte of each step of scaled ones.
-struct ToneCurve {
-    const uint8_t *encode;
+/// What stands for linear values: the code of each step of scaled ones, a byte or 16 bits.
+template <class Code> struct ToneCurve {
+    const Code *encode;
     int steps;
     float scale; // steps for a linear 1
 };
 
-/// Fills bytes from `count` linear values.
-inline void develop(const float *linear, uint8_t *bytes, size_t count, const ToneCurve &tone, int threads) {
+/// Fills codes from `count` linear values.
+template <class Code>
+void develop(const float *linear, Code *codes, size_t count, const ToneCurve<Code> &tone, int threads) {
     const float last = float(tone.steps - 1);
 #pragma omp parallel for schedule(static) num_threads(threads)
-    for (size_t k = 0; k < count; ++k) bytes[k] = tone.encode[int(std::max(0.0f, std::min(last, linear[k] * tone.scale)))];
+    for (size_t k = 0; k < count; ++k) codes[k] = tone.encode[int(std::max(0.0f, std::min(last, linear[k] * tone.scale)))];
 }
 
 } // namespace ringlet

@@ -24,13 +24,12 @@ from pipeline.render.geometry import (
 )
 from pipeline.render.lighting import Lighting
 from pipeline.render.target import Target
-from pipeline.render.tone import average, before_roll_off, develop
+from pipeline.render.tone import CURVES, Pixels, average, develop
 from pipeline.render.view import Place, View
 from pipeline.strands.expand import Expansion, MovedSkin
 from pipeline.strands.random import normal
 
 Points = NDArray[np.float32]
-Pixels = NDArray[np.uint8]
 Linear = NDArray[np.float32]
 
 CHUNK = 65_536  # strands that are in flight at once
@@ -89,8 +88,8 @@ class FrameRenderer:
         self.melanin = np.clip(render.hair.melanin + jitter, 0, 0.99).astype(np.float32)
         self.lighting = Lighting(scene, render.hair, render.grid)
         across, down = (side * render.samples for side in render.size)
-        # Exposure and roll-off apply to what is lit; the background is meant as it is written.
-        background = before_roll_off(np.array(scene.background)) / render.exposure
+        # Exposure and tone curve apply to what is lit; the background is meant as it is written.
+        background = CURVES[render.tone].linear(np.array(scene.background)) / render.gain
         self.target = Target(across, down, tuple(background.tolist()))
         self._lit: Moment | None = None
         self._kept: list[tuple[int, Points]] = []
@@ -102,8 +101,12 @@ class FrameRenderer:
         return choose_shape(self.render, pixels), pixels
 
     def frame(self, moment: Moment) -> Pixels:
-        """Render a moment: sRGB (H, W, 3) uint8."""
-        return develop(self.linear(moment), self.render.exposure)
+        """Render a moment: sRGB (H, W, 3), of as many bits as the config says."""
+        return self.developed(self.linear(moment))
+
+    def developed(self, linear: Linear) -> Pixels:
+        """Pixels (H, W, 3) sRGB of linear ones."""
+        return develop(linear, self.render.gain, self.render.tone, self.render.bits)
 
     def linear(self, moment: Moment, view: View | None = None) -> Linear:
         """Render a moment as `view` sees it, or the camera of the scene: linear RGB (H, W, 3) before the exposure.

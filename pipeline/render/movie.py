@@ -1,44 +1,126 @@
-"""Frames put together: a movie, and a contact sheet."""
+"""Frames put together: a movie, and a contact sheet.
 
-from collections.abc import Sequence
+Movies are in BT.709 colours of limited range, and say so; but for lossless ones, which keep every bit of the frames.
+The same frames give the same bytes, but for AV1: its encoder takes no such care where sides are no multiples of 64.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pipeline import cache
+from pipeline.errors import InputError
 from pipeline.progress import say, track
 
 SHEET_COLUMNS, SHEET_FRAMES, SHEET_WIDTH = 6, 24, 320
 
+Codec = Literal["h264", "av1", "ffv1"]
+_BT709 = 1  # primaries, transfer and matrix: ITU-T H.273
+_LIMITED = 1
 
-def write_movie(frames: Sequence[Path], folder: Path, fps: float) -> Path:
-    """Write <folder>/<folder's name>.mp4 (h264) where PyAV is installed, else an animated PNG; returns its path.
 
-    Without PyAV says so once; the extra `movie` installs it.
+@dataclass(frozen=True)
+class _Format:
+    """How a codec is written: encoders to be tried in this order, with their options."""
+
+    encoders: Mapping[str, Mapping[str, str]]
+    suffix: str
+    container: str
+    pixels: Mapping[int, str]
+    """Pixel format by the bits of the frames."""
+    lossless: bool = False
+
+
+_FORMATS: dict[str, _Format] = {
+    "h264": _Format(
+        {
+            "libx264": {"crf": "17", "preset": "medium", "threads": "1"}
+        },  # one thread: the same bytes every time
+        ".mp4",
+        "mp4",
+        {8: "yuv420p", 16: "yuv420p"},
+    ),
+    "av1": _Format(
+        {
+            "libsvtav1": {"crf": "22", "preset": "6", "svtav1-params": "lp=1"},
+            "libaom-av1": {"crf": "22", "cpu-used": "6", "threads": "1", "b": "0"},
+        },
+        ".av1.mp4",
+        "mp4",
+        {8: "yuv420p10le", 16: "yuv420p10le"},
+    ),
+    "ffv1": _Format({"ffv1": {"level": "3"}}, ".mkv", "matroska", {8: "bgr0", 16: "gbrp16le"}, lossless=True),
+}
+
+
+def write_movie(frames: Sequence[Path], folder: Path, fps: float, codec: Codec | None = None) -> Path:
+    """Write <folder>/<folder's name>.mp4 (h264), .av1.mp4 (av1) or .mkv (ffv1, lossless); returns its path.
+
+    By default h264, and where PyAV is not installed an animated PNG. Raises InputError where a codec is asked for that
+    is not there.
     """
     try:
         import av
     except ImportError:
+        if codec is not None:
+            raise InputError(f'--codec {codec} needs PyAV; pip install "ringlet[movie]"') from None
         say("movie", 'PyAV is not installed: an animated PNG; for an .mp4: pip install "ringlet[movie]"')
         return _animated_png(frames, folder / f"{folder.name}.png", fps)
-    path = folder / f"{folder.name}.mp4"
-    with cache.replacing(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
-        stream.width, stream.height = _even(_load(frames[0])).size
-        stream.pix_fmt = "yuv420p"
-        stream.options = {
-            "crf": "17",
-            "preset": "medium",
-            "threads": "1",
-        }  # one thread: the same bytes every time
+    kind = _FORMATS[codec or "h264"]
+    path = folder / f"{folder.name}{kind.suffix}"
+    exact = {"fflags": "+bitexact"}  # no random identifiers
+    with (
+        cache.replacing(path) as temporary,
+        av.open(str(temporary), "w", format=kind.container, container_options=exact) as container,
+    ):
+        stream = _stream(container, kind, _decoded(frames[0]), fps)
         with track("movie", len(frames)) as bar:
             for frame in frames:
-                for packet in stream.encode(av.VideoFrame.from_image(_even(_load(frame)))):
-                    container.mux(packet)
+                container.mux(stream.encode(_converted(_decoded(frame), stream, kind)))
                 bar.advance()
-        for packet in stream.encode():
-            container.mux(packet)
+        container.mux(stream.encode())
     return path
+
+
+def _stream(container: Any, kind: _Format, first: Any, fps: float) -> Any:
+    import av
+
+    os.environ.setdefault("SVT_LOG", "1")  # its encoder's errors alone
+    there = [name for name in kind.encoders if name in av.codec.codecs_available]
+    if not there:
+        raise InputError(
+            f"this PyAV has no encoder {' or '.join(kind.encoders)}; take another --codec, or another build of PyAV"
+        )
+    stream = container.add_stream(there[0], rate=Fraction(fps).limit_denominator(1001))
+    even = 0 if kind.lossless else 1  # half as many colours need even sides
+    stream.width, stream.height = first.width & ~even, first.height & ~even
+    stream.pix_fmt = kind.pixels[16 if "48" in first.format.name else 8]
+    stream.options = dict(kind.encoders[there[0]])
+    if not kind.lossless:
+        context = stream.codec_context
+        context.color_primaries = context.color_trc = context.colorspace = _BT709
+        context.color_range = _LIMITED
+    return stream
+
+
+def _decoded(path: Path) -> Any:
+    import av
+
+    with av.open(str(path)) as picture:
+        return next(picture.decode(video=0))
+
+
+def _converted(frame: Any, stream: Any, kind: _Format) -> Any:
+    """A frame in the stream's format, cropped to its size."""
+    import av
+
+    pixels = frame.to_ndarray()[: stream.height, : stream.width].copy()
+    cropped = av.VideoFrame.from_ndarray(pixels, format=frame.format.name)
+    colours = {} if kind.lossless else {"dst_colorspace": "ITU709", "dst_color_range": "MPEG"}
+    return cropped.reformat(format=stream.pix_fmt, **colours)
 
 
 def write_sheet(frames: Sequence[Path], folder: Path) -> Path:
@@ -73,8 +155,3 @@ def _load(path: Path) -> Any:
 
     with Image.open(path) as image:
         return image.convert("RGB")
-
-
-def _even(picture: Any) -> Any:
-    """Crop to even sides, which h264's colour format needs."""
-    return picture.crop((0, 0, picture.width & ~1, picture.height & ~1))

@@ -20,10 +20,10 @@ from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.render.body import DrawnBody
 from pipeline.render.camera import CameraPath
-from pipeline.render.frame import FrameRenderer, Moment, Pixels, Skin
+from pipeline.render.frame import FrameRenderer, Moment, Skin
 from pipeline.render.passes import mean, passes
 from pipeline.render.target import Target
-from pipeline.render.tone import develop
+from pipeline.render.tone import Pixels
 
 Record = dict[str, Any]
 
@@ -56,9 +56,8 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
             if name != shape:
                 say("render", f"strands are {name}, {pixels_wide:.2g} px wide, from frame {number} on")
                 shape = name
-            picture = develop(
-                mean(renderer.linear(moments.at(number, shot.back), shot.view) for shot in shots),
-                config.render.exposure,
+            picture = renderer.developed(
+                mean(renderer.linear(moments.at(number, shot.back), shot.view) for shot in shots)
             )
             texts |= {"geometry": name, "frame": str(number), "fingerprint": fingerprint(renderer.target)}
             write(experiment.frames / f"{number:04d}.png", picture, key, record, dict(texts))

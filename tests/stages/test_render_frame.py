@@ -14,7 +14,6 @@ from pipeline import cache, kernels
 from pipeline.config.schema import Camera, Config, Groom, Render, Scene
 from pipeline.render import frame as frame_module
 from pipeline.render.frame import FrameRenderer, Moment, Skin
-from pipeline.render.movie import write_movie, write_sheet
 from pipeline.render.tone import to_srgb
 from pipeline.strands.expand import Binding, Expansion
 
@@ -130,24 +129,6 @@ def test_pictures_carry_their_key_and_broken_ones_are_noticed(tmp_path: Path) ->
     path.write_bytes(path.read_bytes()[:-40])
     with pytest.raises(cache.Damaged):
         cache.picture_record(path)
-
-
-def test_movie_and_contact_sheet_hold_the_frames(tmp_path: Path) -> None:
-    frames = []
-    for i in range(5):
-        frames.append(tmp_path / f"{i:04d}.png")
-        Image.fromarray(np.full((33, 65, 3), 40 * i, np.uint8)).save(frames[-1])
-    movie, sheet = write_movie(frames, tmp_path, 24), write_sheet(frames, tmp_path)
-    with Image.open(sheet) as image:
-        assert image.size[0] == 5 * 320
-    if movie.suffix == ".mp4":
-        import av
-
-        with av.open(str(movie)) as container:
-            assert sum(1 for _ in container.decode(video=0)) == 5
-    else:
-        with Image.open(movie) as image:
-            assert image.n_frames == 5
 
 
 def test_a_machine_without_opengl_gets_one_clear_message() -> None:

@@ -8,7 +8,6 @@ from pipeline.config.schema import Camera, Render
 from pipeline.render.camera import CameraPath
 from pipeline.render.geometry import choose_shape, drawn_width, projected_width, ribbons, smooth, taper
 from pipeline.render.target import BRIGHTEST, DECODED, encode
-from pipeline.render.tone import SHOULDER, WHITE, average, before_roll_off, develop, roll_off, to_srgb
 
 
 @pytest.mark.parametrize(("pixels", "shape"), [(0.2, "coverage"), (1.5, "coverage"), (3.5, "tubes")])
@@ -72,35 +71,3 @@ def test_encoding_and_decoding_lose_less_than_half_a_step() -> None:
     step = 3 * np.cbrt(linear / BRIGHTEST) ** 2 * BRIGHTEST / 255
     assert (np.abs(back - linear) <= 0.51 * step + 1e-7).all()
     assert encode(np.array([100.0]))[0] == 255
-
-
-def test_samples_are_averaged_in_linear_light() -> None:
-    black_and_white = encode(np.indices((4, 4)).sum(axis=0)[..., None] % 2 * np.ones(3))
-    pixels = develop(average(black_and_white, 2), 1.0)
-    assert pixels.shape == (2, 2, 3)
-    assert np.abs(pixels.astype(int) - round(255 * float(to_srgb(np.array(0.5))))).max() <= 1
-
-
-def test_developing_follows_its_formula_in_numpy() -> None:
-    samples = np.random.default_rng(3).integers(0, 256, (12, 18, 3), np.uint8)
-    for per_side in (1, 2, 3):
-        blocks = DECODED[samples].reshape(12 // per_side, per_side, 18 // per_side, per_side, 3)
-        wanted = 255 * to_srgb(roll_off(np.minimum(1.25 * blocks.mean(axis=(1, 3), dtype=np.float64), WHITE)))
-        error = np.abs(develop(average(samples, per_side), 1.25) - wanted).max()
-        print(f"{per_side} x {per_side} samples: largest error {error:.3f} of a byte")
-        assert error < 0.52
-
-
-def test_highlights_roll_off_smoothly_and_reversibly() -> None:
-    linear = np.linspace(0, 2, 2001)
-    shown = roll_off(linear)
-    slope = np.diff(shown) / np.diff(linear)
-    error = float(np.abs(roll_off(before_roll_off(shown)) - shown).max())
-    print(
-        f"slope {slope.min():.3f} .. {slope.max():.3f}, largest step of it {np.abs(np.diff(slope)).max():.1e}; back {error:.1e}"
-    )
-    assert np.array_equal(shown[linear < SHOULDER], linear[linear < SHOULDER])
-    assert (slope >= -1e-12).all()
-    assert np.abs(np.diff(slope)).max() < 2e-3
-    assert shown[linear >= WHITE] == pytest.approx(1)
-    assert error < 1e-12

@@ -1,5 +1,6 @@
 """Options of stage 4: the frames."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -47,6 +48,17 @@ class Render(Section):
     grid: Annotated[int, Field(ge=16, le=512)] = 128
     """Voxels along the longest side of the density grid that gives hair its shadows."""
     exposure: Annotated[float, Field(gt=0)] = 1.25
-    """Factor on linear colours before the sRGB curve."""
+    """Factor on linear colours before the tone curve."""
+    stops: Annotated[float, Field(ge=-20, le=20)] = 0.0
+    """Exposure besides, in stops: each doubles the light."""
+    tone: Literal["soft", "filmic"] = "soft"
+    """Tone curve: "soft" is linear up to 0.6, with highlights rolled off; "filmic" has a film's contrast, and room for light up to 7."""
+    bits: Literal[8, 16] = 8
+    """Bits a channel of the PNG files."""
     hair: Fibre = Fibre()
     """Colour and gloss of the fibres."""
+
+    @property
+    def gain(self) -> float:
+        """Factor on linear colours: exposure and stops."""
+        return self.exposure * math.pow(2, self.stops)
