@@ -47,7 +47,7 @@ class ColumnWriter:
         self._dataset: h5py.Dataset | None = None
 
     def append(self, rows: ArrayLike) -> None:
-        """Append rows (n, *row_shape); raises ValueError for any other shape and TypeError for a lossy dtype."""
+        """Append rows (n, ...), each of the row shape; raises ValueError for any other shape and TypeError for a lossy dtype."""
         array = np.asarray(rows)
         if array.shape[1:] != self.row_shape:
             raise ValueError(f"{self.name}: expected rows of shape {self.row_shape}, got {array.shape[1:]}")
