@@ -120,6 +120,7 @@ void advance_block(Stepper<Real> &stepper, const BlockIndex<Real> &index, StateA
                    const RestShape &rest, const Drive &drive, const StepSettings &settings) {
     stepper.tally = {};
     read(stepper.block, rest, index, settings.torsion != Torsion::kirchhoff);
+    choose_theta(stepper.block, settings);
     read(stepper.now, state, rest.P, index);
     stepper.contacts.forget(rest.P);
     RootPose<Real> roots[2];

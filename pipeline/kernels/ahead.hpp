@@ -25,7 +25,7 @@ template <class Real> struct Ahead {
 
     /// Takes the edges from the start to where they are expected after theta_dt, held points having the velocities u, but
     /// turned by no more than `most` [rad]. Returns the directors there.
-    const Vec3<Real> *look(const Block<Real> &b, const Motion<Real> &from, const Vec3<Real> *u, Real theta_dt, Real most,
+    const Vec3<Real> *look(const Block<Real> &b, const Motion<Real> &from, const Vec3<Real> *u, Lanes<Real> theta_dt, Real most,
                            bool twists, Directors<Real> &directors, Edges<Real> &edges) {
         Lanes<Real> fastest = splat(Real(1e-20));
         for (int i = 0; i < b.P; ++i) {
@@ -34,7 +34,7 @@ template <class Real> struct Ahead {
             by[i - 1] = v[i] - v[i - 1];
             fastest = maximum<Real>(fastest, dot(by[i - 1], by[i - 1]) * edges.il[i - 1] * edges.il[i - 1]);
         }
-        const Lanes<Real> time = minimum<Real>(splat(theta_dt), most * inverse_root<Real>(fastest));
+        const Lanes<Real> time = minimum<Real>(theta_dt, most * inverse_root<Real>(fastest));
         for (int j = 0; j < b.P - 1; ++j) {
             by[j] = time * by[j];
             const Vec3<Real> before = edges.d[j], edge = (from.x[j + 1] - from.x[j]) + by[j];

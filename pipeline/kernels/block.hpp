@@ -95,6 +95,7 @@ template <class Real> struct Block {
     bool clamped = false;     // some lane has a root_weight
     Lanes<Real> k_kappa, k_tau, m0, per_mass; // per_mass = 1 / m0
     Lanes<Real> k_kappa_2, k_ratio, inverse_ratio; // "kirchhoff": B2, B2 / B1, B1 / B2
+    Lanes<Real> theta{};                           // implicitness, see implicitness.hpp
     Lanes<Real> root_kappa, root_kappa_2, root_tau; // square roots of k_kappa, k_kappa_2, k_tau
     Vec3<Real> *anchor;                 // rest position of a point
     Lanes<Real> root_bend[2], root_weight;    // root.hpp; weight 0 unless the head holds points 0 and 1

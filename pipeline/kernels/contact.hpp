@@ -185,7 +185,7 @@ template <class Real> struct Contacts {
     }
 
     /// Step c: what the forces of the rows are worth as displacements.
-    void begin_rounds(const Block<Real> &b, Motion<Real> &to, Real theta_dt2) {
+    void begin_rounds(const Block<Real> &b, Motion<Real> &to, L theta_dt2) {
         for (int i = b.first; i < b.P; ++i) {
             N[i] = row[i] * maximum<Real>(N[i], none);
             a[i] = select<Real>(N[i] > none, one, none);

@@ -62,7 +62,7 @@ template <class Real> void add_edge_forces(const Edges<Real> &edges, int P, Vec3
 /// `undamped` is the part of it without, for stiffness that has no damping.
 template <class Real> struct Scale {
     Lanes<Real> root = splat(Real(1)), inverse = splat(Real(1));
-    Real undamped = 1;
+    Lanes<Real> undamped = splat(Real(1));
 };
 
 /// An energy of squares: residuals and their derivatives by `Reach` consecutive edges, both times scale.root.

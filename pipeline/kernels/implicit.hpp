@@ -76,16 +76,16 @@ template <class Real> struct Velocities {
 template <class Real>
 RINGLET_INLINE void add_point(const Equation<Real> &eq, int i, Lanes<Real> (&mass)[6], Lanes<Real> (&right)[3]) {
     const Block<Real> &b = eq.b;
-    const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
+    const Lanes<Real> theta_dt = b.theta * Real(eq.step.dt);
     const Drag<Real> drag(b, eq.from, i, eq.settings, eq.step.wind);
     Outer<Real> own(drag.t, theta_dt * (drag.c_par - drag.c_perp), 1 + theta_dt * drag.c_perp);
     Vec3<Real> push = eq.step.gravity + drag.push;
     if (eq.outside) {
-        add_rate(*eq.outside, i, splat(theta_dt), own.entries);
+        add_rate(*eq.outside, i, theta_dt, own.entries);
         push = push + eq.outside->push[i];
     }
     for (int k = 0; k < 6; ++k) mass[k] = b.mu[i] * own.entries[k];
-    const Vec3<Real> to = b.mu[i] * (eq.from.v[i] + splat(theta_dt) * push) + splat(theta_dt) * b.load[i];
+    const Vec3<Real> to = b.mu[i] * (eq.from.v[i] + theta_dt * push) + theta_dt * b.load[i];
     right[0] = to.x, right[1] = to.y, right[2] = to.z;
 }
 
@@ -94,7 +94,7 @@ template <class Real>
 RINGLET_INLINE void add_contact(const Equation<Real> &eq, int i, Lanes<Real> (&mass)[6], Lanes<Real> (&right)[3]) {
     if (!any<Real>(eq.contacts.row[i] > 0)) return;
     const Vec3<Real> n = eq.contacts.n[i];
-    const Lanes<Real> k = (Real(eq.settings.theta) * Real(kRow)) * eq.contacts.row[i];
+    const Lanes<Real> k = (eq.b.theta * Real(kRow)) * eq.contacts.row[i];
     const Vec3<Real> to = (k * (dot(n, eq.from.v[i]) - Real(1 / eq.step.dt) * eq.contacts.gap[i])) * n;
     const Outer<Real> row(n, k, Lanes<Real>{});
     for (int e = 0; e < 6; ++e) mass[e] += row.entries[e];
@@ -218,14 +218,14 @@ template <class Real, Torsion torsion> class Solver {
 
     /// theta dt (theta dt + beta) over m0, and its part without beta.
     static Scale<Real> stiffness_scale(const Equation<Real> &eq) {
-        const Real theta_dt = Real(eq.settings.theta) * Real(eq.step.dt);
-        const L square = splat(theta_dt * (theta_dt + Real(eq.settings.damping))) * eq.b.per_mass;
-        return {square_root<Real>(square), 1 / square, theta_dt / (theta_dt + Real(eq.settings.damping))};
+        const L theta_dt = eq.b.theta * Real(eq.step.dt), damped = theta_dt + Real(eq.settings.damping);
+        const L square = theta_dt * damped * eq.b.per_mass;
+        return {square_root<Real>(square), 1 / square, theta_dt / damped};
     }
 
     /// What a gradient is in a right side.
     static L force_scale(const Equation<Real> &eq) {
-        return (-Real(eq.settings.theta) * Real(eq.step.dt)) * eq.b.per_mass;
+        return (-Real(eq.step.dt)) * eq.b.theta * eq.b.per_mass;
     }
 
     /// What begins at point i, without contacts.
@@ -234,7 +234,7 @@ template <class Real, Torsion torsion> class Solver {
         Vec3<Real> F[Span]{}; // gradient by the edges from edge i on, and by their fourth unknowns
         L F_theta[Span]{};
         if (i + 1 < b.P) {
-            terms.first = stretch(b, eq.edges, i, eq.from.T[i], eq.step.dt, eq.settings.theta);
+            terms.first = stretch(b, eq.edges, i, eq.from.T[i], eq.step.dt);
             F[0] = tension(eq.edges, i, eq.from.T[i]);
         } else {
             terms.first = {};
@@ -293,7 +293,7 @@ template <class Real, Torsion torsion> class Solver {
         for (int a = 0; a < 2; ++a) {
             for (int r = 0; r < 6; ++r)
                 for (int c = r; c < 6; ++c) window_.left(r, c) += g[a][r] * g[a][c];
-            root.r[a] += Real(eq.settings.theta * eq.step.dt + eq.settings.damping) * root.by_theta[a] * rate;
+            root.r[a] += (eq.b.theta * Real(eq.step.dt) + Real(eq.settings.damping)) * root.by_theta[a] * rate;
         }
         root.add_gradient(scale, F);
         const L force = force_scale(eq);

@@ -7,6 +7,7 @@
 
 #include "bow.hpp"
 #include "implicit.hpp"
+#include "implicitness.hpp"
 #include "relaxation.hpp"
 #include "ahead.hpp"
 
@@ -164,7 +165,7 @@ template <class Real> class Stepper {
             const M stretched = lengths_.strain(block, to.x) > Real(settings_.tolerance);
             bow_out(block, interval.gravity, wanted & stretched, to.x);
         }
-        M failed = relax(head, from, to, theta() * dt * dt, wanted);
+        M failed = relax(head, from, to, block.theta * (dt * dt), wanted);
         finish(head, from, to, dt);
         if (has_directors()) directors_.follow(block, edges_, start_, dt, from, to);
         return failed;
@@ -174,10 +175,8 @@ template <class Real> class Stepper {
     const Vec3<Real> *linearise(const Motion<Real> &from, Real dt) {
         edges_.follow(from.x, block.P);
         if (settings_.is_explicit || settings_.look_ahead == 0) return from.m;
-        return ahead_.look(block, from, u_, theta() * dt, Real(settings_.look_ahead), has_directors(), directors_, edges_);
+        return ahead_.look(block, from, u_, block.theta * dt, Real(settings_.look_ahead), has_directors(), directors_, edges_);
     }
-
-    Real theta() const { return settings_.is_explicit ? Real(1) : Real(settings_.theta); }
 
     /// Held points go with the head or the hand.
     void move_held(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
@@ -225,7 +224,7 @@ template <class Real> class Stepper {
     }
 
     /// Step d: push, friction, lengths, until strain and depth are both small on the same points.
-    M relax(const HeadStep<Real> &head, const Motion<Real> &from, Motion<Real> &to, Real theta_dt2, M wanted) {
+    M relax(const HeadStep<Real> &head, const Motion<Real> &from, Motion<Real> &to, L theta_dt2, M wanted) {
         const bool newton = settings_.relaxation == Relaxation::newton;
         const int most = newton ? kNewtonRounds : kSweepRounds;
         contacts.begin_rounds(block, to, theta_dt2);
@@ -252,8 +251,8 @@ template <class Real> class Stepper {
 
     /// Velocities from the positions (step e) and tensions from the multipliers (step g).
     void finish(const HeadStep<Real> &head, const Motion<Real> &from, Motion<Real> &to, Real dt) {
-        const L per_theta = splat(1 / theta()), per_move = splat(1 / (dt * theta()));
-        const L per_square = block.m0 * splat(1 / (dt * dt * theta()));
+        const L per_theta = 1 / block.theta, per_move = per_theta * splat(1 / dt);
+        const L per_square = block.m0 * per_move * splat(1 / dt);
         if (!settings_.is_explicit)
             for (int j = 0; j < block.P - 1; ++j) to.T[j] -= per_square * lengths_.lambda[j] * block.inverse_l[j];
         for (int i = 0; i < block.P; ++i) {

@@ -76,9 +76,8 @@ RINGLET_INLINE void look_back(const Outer<Real> &across, const Edges<Real> &edge
 
 /// Stretch of segment j, and the stiffness of its tension T, in the units of the system.
 template <class Real>
-RINGLET_INLINE Outer<Real> stretch(const Block<Real> &b, const Edges<Real> &edges, int j, Lanes<Real> T, double dt,
-                                   double theta) {
-    const Real theta_dt = Real(theta * dt);
+RINGLET_INLINE Outer<Real> stretch(const Block<Real> &b, const Edges<Real> &edges, int j, Lanes<Real> T, double dt) {
+    const Lanes<Real> theta_dt = b.theta * Real(dt);
     const Lanes<Real> tight = (theta_dt * theta_dt) * b.per_mass * maximum<Real>(T, splat(Real(0))) * edges.il[j];
     return {edges.d[j], theta_dt * Real(dt) * stretch_stiffness(b, T, j, Real(dt)) - tight, tight};
 }

@@ -96,6 +96,7 @@ template <class Real> class Together {
     void read_block(Arena &arena, Stepper<Real> &stepper, NeighbourForce<Real> &force, int b) {
         Resident<Real> &resident = blocks_[b].emplace(arena, rest_.P, BlockIndex<Real>(b, rest_.S));
         read(resident.block, rest_, resident.index, settings_.torsion != Torsion::kirchhoff);
+        choose_theta(resident.block, settings_);
         read(resident.now, state_, rest_.P, resident.index);
         stepper.exchange(resident);
         stepper.contacts.forget(rest_.P);

@@ -125,7 +125,7 @@ class Simulate(Section):
     precision: Literal["float32", "float64"] = "float64"
     """Precision of the guides: "float32" is twice as fast, but fails on short strands of many points (spacing below 1 mm)."""
     theta: Annotated[float, Field(ge=0.5, le=1)] = 0.6
-    """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond."""
+    """Implicitness: 1 is the most robust, 0.55 loses the least energy; 0.5 is for steps of a quarter millisecond. Strands of too fine a spacing take up to 1 on their own."""
     look_ahead: bool = False
     """Linearise where hair is expected in the middle of a step: a tenth of the error, for steps of 1/120 s and shorter."""
     torsion: Literal["kirchhoff", "rotor", "frenet", "none"] = "kirchhoff"
