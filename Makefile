@@ -83,7 +83,7 @@ turntable: $(ENV) $(KERNELS) ## once around the hair of CONFIG at rest, as a mov
 
 # --- Checks --------------------------------------------------------------------------------------
 
-.PHONY: test lint validate interpolation gallery images approve bench sanitize schema
+.PHONY: test lint validate interpolation gallery docs site images approve bench sanitize schema
 test: env ## all tests
 	$(BIN)/pytest -n 2 --dist loadfile
 
@@ -102,6 +102,12 @@ interpolation: env ## strands that follow guides against their own simulation; w
 gallery: env ## every style and every operator, rendered; writes docs/gallery.md and docs/operators.md
 	$(BIN)/python docs/gallery.py
 	$(BIN)/python docs/operators.py
+
+docs: gallery site ## the site, with every style and operator rendered anew
+
+site: env ## the site from the pages as they are: build/site/index.html; its examples run
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs build/site
+	@echo build/site/index.html
 
 images: env ## golden images; differences go to an HTML page
 	$(BIN)/pytest tests/images

@@ -48,14 +48,16 @@ def hanging(length):
 simulated = [hanging(length) for length in LENGTHS]
 
 # %%
-# The rod: B theta'' = w (L - s) cos(theta), clamped level at s = 0, free of moment at s = L.
+# The rod: B theta'' = w (L - s) cos(theta), clamped level at s = 0, free of moment at s = L. What clamps a strand is its first segment,
+# and the bend at the next point is that of half a segment on each side: the rod begins at the middle of the first one.
 
 radius, young, density = 40e-6, 4e9, 1300.0
 stiffness = young * np.pi / 4 * radius**4
 weight = density * np.pi * radius**2 * 9.81
 
 
-def rod(length):
+def rod(length, clamp):
+    length = length - clamp
     s = np.linspace(0, length, 200)
     found = solve_bvp(
         lambda s, y: [y[1], weight / stiffness * (length - s) * np.cos(y[0])],
@@ -64,16 +66,17 @@ def rod(length):
         [-np.linspace(0, 1, 200), -np.ones(200)],
         tol=1e-8,
     )
-    # A positive moment bends the strand up; its weight bends it down
-    theta = -np.abs(found.sol(s)[0])
-    return np.stack([np.cos(theta), np.sin(theta)]).cumsum(axis=1) * (s[1] - s[0])
+    theta = found.sol(s)[0]
+    edges = np.stack([np.cos(theta), np.sin(theta)])
+    middles = (edges[:, 1:] + edges[:, :-1]) / 2 * (s[1] - s[0])
+    return np.concatenate([[[0, clamp], [0, 0]], middles], axis=1).cumsum(axis=1)
 
 
 # %%
 
 figure, axis = plt.subplots(figsize=(7, 4.2))
 for length, points in zip(LENGTHS, simulated, strict=True):
-    exact = rod(length)
+    exact = rod(length, clamp=length / 63 / 2)
     gamma = weight * length**3 / stiffness
     (line,) = axis.plot(*exact * 100, label=f"{length * 100:g} cm, Gamma = {gamma:.2g}")
     axis.plot(*points[::3, :2].T * 100, "o", color=line.get_color(), markersize=3.5)

@@ -121,12 +121,20 @@ def _element(inside: Any, path: KeyPath, depth: int) -> Any:
 
 
 def dotted(path: KeyPath) -> str:
-    """Write a path as in "scene.lights[0].irradiance"."""
+    """Write a path.
+
+    >>> dotted(("scene", "lights", 0, "irradiance"))
+    'scene.lights[0].irradiance'
+    """
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.removeprefix(".")
 
 
 def parse_key(text: str) -> KeyPath:
-    """Read "scene.lights[0].irradiance" or "scene.lights.0.irradiance"."""
+    """Read a path, either way of writing it.
+
+    >>> parse_key("scene.lights[0].irradiance") == parse_key("scene.lights.0.irradiance")
+    True
+    """
     parts = re.split(r"[.\[\]]+", text.rstrip("]"))
     return tuple(int(part) if part.isdigit() else part for part in parts)

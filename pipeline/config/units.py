@@ -29,6 +29,12 @@ def parse_quantity(value: Any, units: dict[str, float]) -> float:
 
     Raises ValueError, naming the accepted units, for anything else: a bare number in quotes, an
     unknown unit, a boolean, an infinity or NaN.
+
+    >>> parse_quantity("40 um", {"m": 1.0, "um": 1e-6})
+    4e-05
+    >>> parse_quantity("40 furlongs", {"m": 1.0, "um": 1e-6})
+    Traceback (most recent call last):
+    ValueError: unknown unit 'furlongs'; use one of m, um
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a number or a string with a unit ({', '.join(units)})")

@@ -23,7 +23,12 @@ def hashed(seed: int, index: Index, salt: int) -> NDArray[np.uint32]:
 
 
 def uniform(seed: int, index: Index, salt: int) -> NDArray[np.float64]:
-    """Uniform numbers in [0, 1), one for each index; `salt` tells the uses of one strand apart."""
+    """Uniform numbers in [0, 1), one for each index; `salt` tells the uses of one strand apart.
+
+    >>> alone, among_others = uniform(1, np.array([123]), 7), uniform(1, np.arange(1000), 7)
+    >>> bool(alone[0] == among_others[123])
+    True
+    """
     return hashed(seed, index, salt) / 2.0**32
 
 
