@@ -17,6 +17,7 @@ from pipeline.cli import (  # noqa: F401, they add their commands
     exchange_commands,
     look_commands,
     run_commands,
+    sweep_commands,
 )
 from pipeline.cli.base import app
 from pipeline.errors import DONE, FAULT, WRONG_INPUT, Stopped, verdict

@@ -1,0 +1,46 @@
+"""The command for many experiments of one config: sweep."""
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from pipeline import log
+from pipeline.cli.base import AS_USUAL, OUTPUTS, STAGES_GROUP, ConfigFile, Manner, Outputs, Settings, app
+
+
+@app.command(group=STAGES_GROUP, sort_key=1.5)
+def sweep(
+    config: ConfigFile,
+    *,
+    only: Annotated[
+        str,
+        Parameter(
+            show_default=False,
+            help='Experiments whose name, or what follows its "@", fits a pattern: "*irradiance=2*".',
+        ),
+    ] = "*",
+    names: Annotated[
+        bool, Parameter(negative="", show_default=False, help="Print the experiments' names and do nothing.")
+    ] = False,
+    settings: Settings = (),
+    outputs: Outputs = OUTPUTS,
+    manner: Manner = AS_USUAL,
+) -> None:
+    """Run every experiment of a config's [sweep]; stages that its values do not touch are made once."""
+    from pipeline.batch.sweep import batch_of, chosen, make_all
+    from pipeline.batch.table import write_table
+    from pipeline.cache import Experiment
+    from pipeline.config.sweep import load_sweep
+
+    log.use(manner.log_format)
+    swept = load_sweep(config, settings)
+    runs = chosen(swept, only)
+    if names:
+        print("\n".join(run.name for run in runs))
+        return
+    with log.kept_in(Experiment(outputs / swept.base.config.name).log):
+        try:
+            make_all([batch_of(run, outputs) for run in runs])
+        finally:
+            path = write_table(swept, outputs, config)
+    print(path)
