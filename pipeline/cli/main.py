@@ -15,6 +15,7 @@ from pipeline.cli import (  # noqa: F401, they add their commands
     check_commands,
     completion,
     exchange_commands,
+    farm_commands,
     look_commands,
     run_commands,
     sweep_commands,

@@ -5,7 +5,18 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pipeline import log
-from pipeline.cli.base import AS_USUAL, OUTPUTS, STAGES_GROUP, ConfigFile, Manner, Outputs, Settings, app
+from pipeline.cli.base import (
+    AS_USUAL,
+    HERE,
+    OUTPUTS,
+    STAGES_GROUP,
+    ConfigFile,
+    Manner,
+    Outputs,
+    Settings,
+    Where,
+    app,
+)
 
 
 @app.command(group=STAGES_GROUP, sort_key=1.5)
@@ -25,6 +36,7 @@ def sweep(
     settings: Settings = (),
     outputs: Outputs = OUTPUTS,
     manner: Manner = AS_USUAL,
+    where: Where = HERE,
 ) -> None:
     """Run every experiment of a config's [sweep]; stages that its values do not touch are made once."""
     from pipeline.batch.sweep import batch_of, chosen, make_all
@@ -39,8 +51,13 @@ def sweep(
         print("\n".join(run.name for run in runs))
         return
     with log.kept_in(Experiment(outputs / swept.base.config.name).log):
+        batches = [batch_of(run, outputs) for run in runs]
         try:
-            make_all([batch_of(run, outputs) for run in runs])
+            if not where.here:
+                from pipeline.farm.run import make
+
+                make(batches, where.workers, where.scheduler)
+            make_all(batches)
         finally:
             path = write_table(swept, outputs, config)
     print(path)
