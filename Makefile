@@ -51,7 +51,7 @@ NAME    := $(firstword $(subst |, ,$(filter %|$(CONFIG),$(ALL))))
 
 # The experiments that this call of make is about; only their rules are read.
 GOALS   := $(foreach g,$(MAKECMDGOALS),$(firstword $(subst /, ,$(g:outputs/%=%))))
-WANTED  := $(sort $(filter $(NAMES),$(GOALS)) $(if $(filter render movie sheet,$(GOALS)),$(NAME)))
+WANTED  := $(sort $(filter $(NAMES),$(GOALS)) $(if $(filter render movie sheet sweep,$(GOALS)),$(NAME)))
 
 ifneq ($(WANTED),)
 # Which frames there are and which key each stage has, `ringlet keys` writes down: see pipeline/cli/stamps.py.
@@ -66,10 +66,10 @@ $(foreach n,$(WANTED),$(eval $(call rules,$n)))
 include $(WANTED:%=outputs/%/targets.mk)
 
 .PHONY: $(WANTED) $(WANTED:%=outputs/%)
-$(filter-out render movie sheet,$(WANTED)): %: outputs/%
+$(filter-out render movie sheet sweep,$(WANTED)): %: outputs/%
 endif
 
-.PHONY: render movie sheet turntable
+.PHONY: render movie sheet turntable sweep
 render: $(if $(NAME),outputs/$(NAME)) ## frames of CONFIG (configs/default.toml): make render CONFIG=configs/curly.toml
 
 movie: render ## the frames of CONFIG as one movie
@@ -80,6 +80,8 @@ sheet: render ## the frames of CONFIG on one page
 
 turntable: $(ENV) $(KERNELS) ## once around the hair of CONFIG at rest, as a movie: outputs/<name>-turntable
 	@$(RINGLET) turntable $(CONFIG)
+
+sweep: $(if $(NAME),outputs/$(NAME)/sweep) ## all experiments of CONFIG's [sweep], on WORKERS processes if set
 
 # --- Checks --------------------------------------------------------------------------------------
 

@@ -60,8 +60,8 @@ def emit(stage: str, event: str, text: str, *, shown: bool = True, **figures: An
     replay(record | figures, shown=shown)
 
 
-def replay(record: Record, *, shown: bool = True) -> None:
-    """Say what was said in another process, with its own time, run and memory."""
+def replay(record: Record, *, shown: bool = True, also: Path | None = None) -> None:
+    """Say what was said in another process, with its own time, run and memory; and keep it `also` in a log."""
     if _sinks:
         _sinks[-1](record)
         return
@@ -70,7 +70,7 @@ def replay(record: Record, *, shown: bool = True) -> None:
         _print(line)
     elif shown and record["event"] not in _QUIET_IN_TEXT:
         _print(record["text"] if record["event"] == "error" else f"{record['stage']}: {record['text']}")
-    for path in list(_files):
+    for path in {file.resolve(): file for file in (*_files, *([also] if also else []))}.values():
         _append(path, line)
 
 
@@ -147,7 +147,8 @@ def _append(path: Path, line: str) -> None:
         finally:
             os.close(handle)
     except OSError:
-        _files.remove(path)
+        with suppress(ValueError):
+            _files.remove(path)
 
 
 def _put_aside(path: Path) -> None:

@@ -1,5 +1,4 @@
-"""
-One value of a style
+"""One value of a style
 ====================
 
 A config that extends another changes single values. Here the ends of the shipped default's locks are drawn together less, then more.

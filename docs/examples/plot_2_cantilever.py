@@ -1,5 +1,4 @@
-"""
-A hair that bends under its own weight
+"""A hair that bends under its own weight
 ======================================
 
 An experiment of a few strands: straight, clamped at their roots, level, and let go. How far a strand droops is set by one number, the

@@ -1,5 +1,4 @@
-"""
-Three models of torsion under a shake
+"""Three models of torsion under a shake
 =====================================
 
 The same ringlets, shaken by the head for a second and then left alone, with each of the three models of torsion. What the diagnostics of

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from pipeline import log
 from pipeline.batch.stages import Batch
 from pipeline.cache import Experiment
 from pipeline.config import STAGES
@@ -39,8 +40,9 @@ def make_all(batches: Sequence[Batch], touch: bool = True) -> None:
         name = batch.experiment.folder.name
         say("sweep", f"{number}/{len(batches)} {name}")
         try:
-            for stage in STAGES:
-                batch.make(stage, touch=touch)
+            with log.kept_in(batch.experiment.log):
+                for stage in STAGES:
+                    batch.make(stage, touch=touch)
         except InputError as error:
             say("sweep", f"{name} failed; going on with the others")
             wrong.append(f"{name}: {error}")

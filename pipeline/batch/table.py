@@ -90,7 +90,7 @@ def _stage(batch: Batch, stage: str, first: dict[str, str]) -> Row:
     return {
         "key": key,
         "fresh": fresh,
-        "seconds": batch.seconds(stage) if fresh else None,
+        "seconds": batch.seconds(stage) if fresh and owner == name else None,
         "shared_with": None if owner == name else owner,
     }
 

@@ -69,6 +69,29 @@ class Manner:
 
 AS_USUAL = Manner()
 
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Where:
+    """Where a command that makes something does it: here, or on workers."""
+
+    workers: Annotated[
+        int | None,
+        Parameter(show_default=False, help="Start so many worker processes, which share this machine."),
+    ] = None
+    scheduler: Annotated[
+        str,
+        Parameter(show_default=False, help='Use the workers of a Dask scheduler, such as "tcp://host:8786".'),
+    ] = ""
+
+    @property
+    def here(self) -> bool:
+        """Whether there are no workers."""
+        return self.workers is None and not self.scheduler
+
+
+HERE = Where()
+
 FrameRange = Annotated[
     str, Parameter(show_default=False, help='Only these frames, counted from 1: "10-20", or one, "7".')
 ]

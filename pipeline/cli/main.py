@@ -15,8 +15,10 @@ from pipeline.cli import (  # noqa: F401, they add their commands
     check_commands,
     completion,
     exchange_commands,
+    farm_commands,
     look_commands,
     run_commands,
+    sweep_commands,
 )
 from pipeline.cli.base import app
 from pipeline.errors import DONE, FAULT, WRONG_INPUT, Stopped, verdict

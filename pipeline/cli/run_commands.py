@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from pipeline import log
 from pipeline.cli.base import (
     AS_USUAL,
+    HERE,
     OUTPUTS,
     STAGES_GROUP,
     ConfigFile,
@@ -16,6 +17,7 @@ from pipeline.cli.base import (
     Manner,
     Outputs,
     Settings,
+    Where,
     app,
     experiment_of,
     frame_range,
@@ -41,9 +43,10 @@ def run(
     settings: Settings = (),
     outputs: Outputs = OUTPUTS,
     manner: Manner = AS_USUAL,
+    where: Where = HERE,
 ) -> None:
     """Run all stages that are not fresh."""
-    _make(config, until, settings, outputs, manner, frames, everything=True)
+    _make(config, until, settings, outputs, manner, frames, everything=True, where=where)
 
 
 @app.command(group=STAGES_GROUP, sort_key=2)
@@ -78,9 +81,10 @@ def render(
     settings: Settings = (),
     outputs: Outputs = OUTPUTS,
     manner: Manner = AS_USUAL,
+    where: Where = HERE,
 ) -> None:
     """Stage 4: the frames as PNG files."""
-    _make(config, "render", settings, outputs, manner, frames)
+    _make(config, "render", settings, outputs, manner, frames, where=where)
 
 
 @app.command(group=STAGES_GROUP, sort_key=6)
@@ -154,6 +158,7 @@ def _make(
     manner: Manner,
     frames: str = "",
     everything: bool = False,
+    where: Where = HERE,
 ) -> None:
     """Make a stage and whatever it needs; `everything` also makes the stages before it that it does not need."""
     from pipeline.cli.machine import refuse_bare_start
@@ -172,6 +177,10 @@ def _make(
     with log.kept_in(batch.experiment.log):
         if not manner.force:
             _refuse_what_does_not_fit(batch, (*before, stage), wanted)
+        if not where.here:
+            from pipeline.farm.run import make
+
+            make([batch], where.workers, where.scheduler, stage, wanted)
         for name in before:
             batch.make(name, touch=everything)
         batch.make(stage, wanted if stage == "render" else None)

@@ -1,14 +1,20 @@
 """What make reads: a stamp for each stage, changed only when its key is, and the rules of one config."""
 
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from pipeline.batch.stages import Batch
+from pipeline.batch.sweep import batch_of
 from pipeline.cache import Experiment, replacing
 from pipeline.config import STAGES, Loaded
 from pipeline.config.load import named_files
+from pipeline.config.sweep import load_sweep
 
 _RULES = """\
 # Rules of {config}, written by `ringlet keys`; made again whenever one of these files changes.
+equals := =
 {folder}/targets.mk: {files}
 {files}:
 
@@ -29,30 +35,65 @@ _RULES = """\
 
 {folder}: {frames}
 
+.PHONY: {folder}/sweep
+{sweep}
 # Every file appears whole, so nothing has to be thrown away when another one fails.
 .PRECIOUS: {groom} {guides} {strands} {frames}
 """
 
+_SWEEP = """\
+{folder}/sweep: {products}
+
+{products} &: {stamp}
+	@$(RINGLET) sweep {config} $(if $(WORKERS),--workers $(WORKERS))
+
+.PRECIOUS: {products}
+"""
+
+_NO_SWEEP = """\
+{folder}/sweep:
+	@$(RINGLET) sweep {config}
+"""
+
 
 def write_stamps(config: Path, loaded: Loaded, experiment: Experiment) -> None:
-    """Write keys/<stage>.key where it changed, and targets.mk."""
+    """Write keys/<stage>.key where it changed, for a sweep also keys/sweep.key, and targets.mk."""
     batch = Batch(loaded.config, experiment)
-    for stage, key in batch.keys.items():
+    runs = load_sweep(config).runs if loaded.config.sweep else ()
+    batches = [batch_of(run, experiment.folder.parent) for run in runs]
+    keys = batch.keys | ({"sweep": _together(batches)} if batches else {})
+    for stage, key in keys.items():
         stamp = _stamp(experiment, stage)
         if not stamp.exists() or stamp.read_text() != key:
             _write(stamp, key)
+    sources = dict.fromkeys(
+        path for each in (loaded, *(run.loaded for run in runs)) for path in _sources(each)
+    )
+    products = [path for each in batches for stage in STAGES for path in each.outputs(stage)]
     rules = _RULES.format(
         config=_escaped(config),
         folder=_escaped(experiment.folder),
-        files=" ".join(_escaped(file) for file in _sources(loaded)),
+        files=_listed(sources),
         keys=_escaped(experiment.folder / "keys"),
-        stamps=" ".join(_escaped(_stamp(experiment, stage)) for stage in STAGES),
+        stamps=_listed(_stamp(experiment, stage) for stage in keys),
         groom=_escaped(experiment.groom),
         guides=_escaped(experiment.guides),
         strands=_escaped(experiment.strands),
-        frames=" ".join(_escaped(frame) for frame in batch.outputs("render")),
+        frames=_listed(batch.outputs("render")),
+        sweep=(_SWEEP if batches else _NO_SWEEP).format(
+            config=_escaped(config),
+            folder=_escaped(experiment.folder),
+            stamp=_escaped(_stamp(experiment, "sweep")),
+            products=_listed([*products, *(experiment.folder / f"sweep.{kind}" for kind in ("json", "csv"))]),
+        ),
     )
     _write(experiment.folder / "targets.mk", rules)
+
+
+def _together(batches: Sequence[Batch]) -> str:
+    """The key of all experiments of a sweep."""
+    text = json.dumps([[batch.experiment.folder.name, batch.keys] for batch in batches], sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
 def _stamp(experiment: Experiment, stage: str) -> Path:
@@ -69,6 +110,17 @@ def _write(path: Path, text: str) -> None:
         temporary.write_text(text)
 
 
+def _listed(paths: Iterable[Path]) -> str:
+    return " ".join(_escaped(path) for path in paths)
+
+
 def _escaped(path: Path) -> str:
     """Quote what make would take for its own syntax."""
-    return str(path).replace("$", "$$").replace("#", "\\#").replace(" ", "\\ ").replace(":", "\\:")
+    return (
+        str(path)
+        .replace("$", "$$")
+        .replace("#", "\\#")
+        .replace(" ", "\\ ")
+        .replace(":", "\\:")
+        .replace("=", "$(equals)")
+    )

@@ -146,12 +146,11 @@ def _runs(
         name = _name(base, {short[key]: value for key, value in values.items()})
         own = tree.copy()
         own.values["name"] = name
-        messages = _set(own, places, values)
-        if not messages:
-            loaded, messages = validated(own, path, files)
-            if loaded is not None:
-                runs.append(Run(loaded, values))
-        for message in messages:
+        unset = _set(own, places, values)
+        loaded, messages = validated(own, path, files)
+        if loaded is not None:
+            runs.append(Run(loaded, values))
+        for message in unset + messages:
             known = any(message.startswith(_origin(tree, key, place)) for key, place in places.items())
             wrong.setdefault(message, []).extend([] if known else [name])
     return runs, [message + _among(names, len(combinations)) for message, names in wrong.items()]

@@ -11,6 +11,8 @@ from pipeline.batch.stages import Batch
 from pipeline.cli.main import main
 from pipeline.config import keys, provenance
 
+FIGURES = ("bending", "torsion", "kinetic", "gravity", "strain", "penetration", "contacts")
+
 
 def execute(batch: Batch, stage: str, frames: tuple[int, ...]) -> None:
     log(f"{stage} {' '.join(str(frame) for frame in frames)}".rstrip())
@@ -21,7 +23,8 @@ def execute(batch: Batch, stage: str, frames: tuple[int, ...]) -> None:
             cache.write_picture(batch.experiment.frames / f"{number:04d}.png", pixels, key, record)
     elif stage == "simulate":
         with cache.create_guides(batch.file(stage), key, record, guides=1, points=8, fps=24) as writer:
-            writer.append(np.zeros((1, 8, 3)), np.eye(4))
+            for _ in range(batch.config.simulate.frames):
+                writer.append(np.zeros((1, 8, 3)), np.eye(4), dict.fromkeys(FIGURES, 0.5))
     else:
         with cache.create(
             batch.file(stage), kind="groom" if stage == "groom" else "strands", key=key, provenance=record

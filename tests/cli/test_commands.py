@@ -164,7 +164,7 @@ def test_inspect_verifies(ringlet: Ringlet) -> None:
     ringlet("run")
     counts: dict[str, Any] = {
         "groom.h5": {"kind": "groom", "strands": 2, "points": 8, "frames": None},
-        "guides.h5": {"kind": "guides", "strands": 1, "points": 8, "frames": 1},
+        "guides.h5": {"kind": "guides", "strands": 1, "points": 8, "frames": 3},
         "frames/0001.png": {"kind": "frame", "frames": 1},
     }
     for name, expected in counts.items():

@@ -182,6 +182,52 @@ def test_more_frames_rerun_what_depends_on_their_number(rendered: Project) -> No
     assert rendered.make("render") == ["simulate", "render 1 2 3 4"]
 
 
+SWEEP = BASE + '[sweep]\n"simulate.theta" = [0.6, 0.7]\n"render.exposure" = [1.0, 2.0]\n'
+
+
+def test_a_sweep_makes_shared_stages_once_and_then_nothing(project: Project) -> None:
+    project.write("default", SWEEP)
+    ran = project.make("sweep")
+    assert sorted(ran) == sorted(["groom", "interpolate", *2 * ["simulate"], *4 * ["render 1 2 3"]])
+    assert project.make("sweep") == []
+    assert "Nothing to be done for 'sweep'" in project.run("sweep").stdout
+    project.frame(2, "default@theta=0.7,exposure=2.0").unlink()
+    assert project.make("sweep") == ["render 2"]
+    project.write("default", SWEEP.replace("[1.0, 2.0]", "[1.0, 3.0]"))
+    assert project.make("sweep") == ["render 1 2 3", "render 1 2 3"]
+    project.write("default", SWEEP.replace("[1.0, 2.0]", "[3.0, 1.0] # in another order"))
+    assert project.make("sweep") == []
+    assert project.make("render") == ["render 1 2 3"]  # the config without its sweep shares what it can
+
+
+def test_a_config_without_a_sweep_says_so(project: Project) -> None:
+    result = project.run("sweep")
+    assert result.returncode == 2
+    assert "configs/default.toml: sweep: has to be set" in result.stderr
+
+
+def test_nothing_to_do_for_twenty_configs_and_a_sweep_of_twenty_takes_no_time(project: Project) -> None:
+    names = [f"config{number}" for number in range(20)]
+    for number, name in enumerate(names):
+        project.write(name, f'extends = "default.toml"\nseed = {number}\n')
+    seeds = ", ".join(str(number) for number in range(20))
+    project.write("many", f'extends = "default.toml"\n[sweep]\nseed = [{seeds}]\n')
+    project.make("-j2", *names)
+    project.make("sweep", "CONFIG=configs/many.toml")
+    for goals in (names, ["sweep", "CONFIG=configs/many.toml"]):
+        best = float("inf")
+        for _ in range(3):
+            before = os.times()
+            assert project.make(*goals) == []
+            after = os.times()
+            best = min(
+                best,
+                after.children_user + after.children_system - before.children_user - before.children_system,
+            )
+        print(f"nothing to do for {goals[0]} and so on: {best:.3f} s of processor time")
+        assert best < 0.5
+
+
 def test_a_wrong_config_stops_make_with_our_message(project: Project) -> None:
     project.write("default", BASE.replace("samples", "smaples"))
     result = project.run("render")

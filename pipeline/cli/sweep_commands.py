@@ -1,0 +1,63 @@
+"""The command for many experiments of one config: sweep."""
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from pipeline import log
+from pipeline.cli.base import (
+    AS_USUAL,
+    HERE,
+    OUTPUTS,
+    STAGES_GROUP,
+    ConfigFile,
+    Manner,
+    Outputs,
+    Settings,
+    Where,
+    app,
+)
+
+
+@app.command(group=STAGES_GROUP, sort_key=1.5)
+def sweep(
+    config: ConfigFile,
+    *,
+    only: Annotated[
+        str,
+        Parameter(
+            show_default=False,
+            help='Experiments whose name, or what follows its "@", fits a pattern: "*irradiance=2*".',
+        ),
+    ] = "*",
+    names: Annotated[
+        bool, Parameter(negative="", show_default=False, help="Print the experiments' names and do nothing.")
+    ] = False,
+    settings: Settings = (),
+    outputs: Outputs = OUTPUTS,
+    manner: Manner = AS_USUAL,
+    where: Where = HERE,
+) -> None:
+    """Run every experiment of a config's [sweep]; stages that its values do not touch are made once."""
+    from pipeline.batch.sweep import batch_of, chosen, make_all
+    from pipeline.batch.table import write_table
+    from pipeline.cache import Experiment
+    from pipeline.config.sweep import load_sweep
+
+    log.use(manner.log_format)
+    swept = load_sweep(config, settings)
+    runs = chosen(swept, only)
+    if names:
+        print("\n".join(run.name for run in runs))
+        return
+    with log.kept_in(Experiment(outputs / swept.base.config.name).log):
+        batches = [batch_of(run, outputs) for run in runs]
+        try:
+            if not where.here:
+                from pipeline.farm.run import make
+
+                make(batches, where.workers, where.scheduler)
+            make_all(batches)
+        finally:
+            path = write_table(swept, outputs, config)
+    print(path)

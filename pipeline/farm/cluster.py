@@ -1,0 +1,97 @@
+"""Where tasks run: worker processes of this machine, or those of a scheduler that is there already."""
+
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from pipeline.errors import InputError
+from pipeline.farm.tasks import THREADS
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+ATTEMPTS = 10  # workers that may die over one task before it is given up
+_CONNECT_S = 10
+
+
+def need_distributed() -> None:
+    """Raise InputError when Dask distributed is not installed."""
+    try:
+        import distributed  # noqa: F401
+    except ImportError:
+        raise InputError(
+            'several workers need Dask distributed; install it with: pip install "ringlet[farm]"'
+        ) from None
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def environment(threads: int) -> dict[str, str]:
+    """What a worker's process needs in order to leave the other processors to others."""
+    return {
+        THREADS: str(threads),
+        "OMP_NUM_THREADS": str(threads),
+        "LP_NUM_THREADS": str(threads),
+        "OMP_WAIT_POLICY": "passive",
+    }
+
+
+@contextmanager
+def local_cluster(workers: int) -> Iterator[str]:
+    """Start a scheduler and workers on this machine, which share its processors; lends the scheduler's address."""
+    need_distributed()
+    import dask
+    from distributed import LocalCluster
+
+    if workers < 1:
+        raise InputError(f"--workers {workers}: expected a number above 0")
+    threads = max(1, processors() // workers)
+    settings = {
+        "distributed.scheduler.allowed-failures": ATTEMPTS,
+        "distributed.nanny.pre-spawn-environ": environment(threads),
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+    }
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            memory_limit=0,  # the planner has refused what does not fit
+            host="127.0.0.1",
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+    ):
+        yield cluster.scheduler_address
+
+
+@contextmanager
+def connected(address: str) -> Iterator["Client"]:
+    """A client of a scheduler; raises OSError when there is none at this address, InputError for what is no address."""
+    need_distributed()
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=_CONNECT_S, set_as_default=False)
+    except ValueError as error:
+        raise InputError(
+            f'--scheduler {address}: expected an address such as "tcp://host:8786" ({error})'
+        ) from None
+    with client:
+        client.run_on_scheduler(_patient(ATTEMPTS))
+        yield client
+
+
+def _patient(attempts: int) -> Any:
+    """A function of the scheduler's that need not know ringlet: it travels whole."""
+
+    def set_attempts(dask_scheduler: Any) -> None:
+        dask_scheduler.allowed_failures = max(dask_scheduler.allowed_failures, attempts)
+
+    return set_attempts
