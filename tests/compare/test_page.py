@@ -42,7 +42,10 @@ def page(tmp_path: Path) -> Path:
     save(b / "only.png", red, RENDERERS[1])
     page = tmp_path / "page.html"
     page.write_text(
-        comparison_page(f"golden {HOSTILE}", compare(a, b, Limits(flip=0.01)).pairs, [HOSTILE]), "utf-8"
+        comparison_page(
+            f"golden {HOSTILE}", compare(a, b, Limits(flip=0.01, ssim=0.9, blurred=0.01)).pairs, [HOSTILE]
+        ),
+        "utf-8",
     )
     return page
 
