@@ -115,7 +115,7 @@ images: env ## golden images; differences go to an HTML page
 	$(BIN)/pytest tests/images
 
 approve: env ## take the new images as the golden ones: make approve WHY="the reason"
-	$(BIN)/python tests/images/approve.py "$(WHY)"
+	$(RINGLET) approve "$(WHY)"
 
 bench: env ## the figures of the README
 	$(RINGLET) bench simulate

@@ -1,6 +1,10 @@
 """Named tiny strands: every one is (P, 3) float64 [m], root first, at equal spacing; and what every test leaves as it was."""
 
-from collections.abc import Iterator
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +28,41 @@ def _threads() -> Iterator[None]:
     count = kernels.threads()
     yield
     kernels.set_threads(count)
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """A headless browser, the system's; skips where there is none."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="pages are tested with playwright")
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if program is None:
+        pytest.skip("pages are tested in Chromium, which is not installed: apt-get install chromium")
+    with sync_api.sync_playwright() as playwright:
+        sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []
+        browser = playwright.chromium.launch(executable_path=program, args=sandbox)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(chromium: Any) -> Iterator[Callable[[Path], Any]]:
+    """Open a page from disk; at the end: no error on its console, no request for anything but what lies beside it."""
+    said: list[str] = []
+    asked: list[str] = []
+    page = chromium.new_page(viewport={"width": 1280, "height": 900})
+    page.on("console", lambda message: said.append(f"{message.type}: {message.text}"))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("dialog", lambda dialog: (said.append(f"dialog: {dialog.message}"), dialog.dismiss()))
+    page.on("request", lambda request: asked.append(request.url))
+
+    def go(path: Path) -> Any:
+        page.goto(path.as_uri())
+        return page
+
+    yield go
+    page.close()
+    assert said == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Commands that check and measure: validate, bench, compare, doctor."""
+"""Commands that check and measure: validate, bench, doctor."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -174,27 +174,6 @@ def bench_render(
 
     found = bench(strands=strands, points=points, size=_size(size), geometry=geometry, samples=samples)
     _report(found, json)
-
-
-@app.command(group=CHECK_GROUP)
-def compare(
-    reference: Annotated[Path, Parameter(help="A PNG, or a folder of them.")],
-    picture: Annotated[Path, Parameter(help="What is compared with it.")],
-    *,
-    page: Annotated[Path | None, Parameter(help="Write an HTML page of what differs.")] = None,
-    json: Json = False,
-) -> int:
-    """Compare two pictures or two folders; exit code 1 when a pixel differs."""
-    from pipeline.compare import compare as compare_pictures
-
-    found = compare_pictures(reference, picture, page)
-    if json:
-        print_json(found.as_json())
-        return 0 if found.identical else 1
-    for pair in found.pairs:
-        figures = vars(pair.metrics).items() if pair.metrics else ()
-        print(f"{pair.name:<16}", "  ".join(f"{name} {value:.5f}" for name, value in figures) or "missing")
-    return 0 if found.identical else 1
 
 
 @app.command(group=CHECK_GROUP)

@@ -13,6 +13,7 @@ from cyclopts import CycloptsError
 from pipeline import log
 from pipeline.cli import (  # noqa: F401, they add their commands
     check_commands,
+    compare_commands,
     completion,
     exchange_commands,
     farm_commands,

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.compare.pictures import Picture, encoded, finite
 from pipeline.errors import InputError
-
-Picture = NDArray[np.uint8]
 
 BLUR = 9  # [px] side of the box that averages strands to tone
 
@@ -34,16 +33,19 @@ class Metrics:
 
 
 def measure(reference: Picture, picture: Picture) -> Metrics:
-    """Compare two (H, W, 3) uint8 sRGB pictures of one size.
+    """Compare two pictures (H, W, 3) of one size, both uint8 sRGB or both float32 linear.
 
-    Raises InputError when the sizes differ or the optional packages of the extra `compare` are missing.
+    Linear ones are compared by FLIP for high dynamic range and, for the rest, as a screen shows them. Raises
+    InputError when sizes or types differ or the optional packages of the extra `compare` are missing.
     """
     if reference.shape != picture.shape:
         raise InputError(f"pictures differ in size: {_size(reference)} and {_size(picture)}")
-    changed = float(np.any(reference != picture, axis=-1).mean())
+    if reference.dtype != picture.dtype:
+        raise InputError("pictures differ in kind: one is linear (EXR), the other one is not")
+    changed = float(_differs(reference, picture).mean())
     if changed == 0:
         return Metrics(changed=0.0, flip=0.0, ssim=1.0, blurred=0.0, luminance=0.0)
-    a, b = _unit(reference), _unit(picture)
+    a, b = encoded(reference), encoded(picture)
     return Metrics(
         changed=changed,
         flip=float(flip_map(reference, picture).mean()),
@@ -54,15 +56,27 @@ def measure(reference: Picture, picture: Picture) -> Metrics:
 
 
 def flip_map(reference: Picture, picture: Picture) -> NDArray[np.float32]:
-    """FLIP of each pixel, (H, W) float32 in 0..1, as seen from 0.7 m on a 4K screen."""
+    """FLIP of each pixel, (H, W) float32 in 0..1, as seen from 0.7 m on a 4K screen.
+
+    Linear pictures: the largest over all exposures (Andersson et al., "Visualizing Errors in Rendered High Dynamic
+    Range Images", 2021).
+    """
     try:
         import flip_evaluator
     except ImportError as error:
         raise _missing("flip-evaluator") from error
+    linear = reference.dtype != np.uint8
+    pair = [np.ascontiguousarray(finite(each) if linear else encoded(each)) for each in (reference, picture)]
     errors, _, _ = flip_evaluator.evaluate(
-        _unit(reference), _unit(picture), "LDR", applyMagma=False, computeMeanError=False
+        *pair, "HDR" if linear else "LDR", applyMagma=False, computeMeanError=False
     )
     return np.asarray(errors, np.float32).reshape(reference.shape[:2])
+
+
+def _differs(reference: Picture, picture: Picture) -> NDArray[np.bool_]:
+    """Pixels that differ, (H, W) bool; what is not a number equals itself."""
+    both = np.isnan(reference) & np.isnan(picture)
+    return np.asarray(((reference != picture) & ~both).any(axis=-1))
 
 
 def _ssim(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
@@ -82,10 +96,6 @@ def _blur(image: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _luminance(image: NDArray[np.float32]) -> NDArray[np.float32]:
     return image @ np.array([0.2126, 0.7152, 0.0722], np.float32)
-
-
-def _unit(picture: Picture) -> NDArray[np.float32]:
-    return np.ascontiguousarray(picture, np.float32) / np.float32(255)
 
 
 def _size(picture: Picture) -> str:

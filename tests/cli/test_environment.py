@@ -1,6 +1,7 @@
 """`make env` on machines that lack something: it says what to run, and leaves nothing half-made."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -32,7 +33,7 @@ class Machine:
         return subprocess.run(
             [SCRIPT, self.folder / "venv"],
             cwd=SCRIPT.parents[1],
-            env=os.environ | {"PATH": path} | variables,
+            env=os.environ | {"PATH": path, "CI": ""} | variables,
             capture_output=True,
             text=True,
         )
@@ -41,6 +42,28 @@ class Machine:
 @pytest.fixture
 def machine(tmp_path: Path) -> Machine:
     return Machine(tmp_path)
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_continuous_integration_tries_to_bring_a_browser_and_goes_on_without(
+    machine: Machine, works: bool
+) -> None:
+    machine.program("sudo", 'shift; exec "$@"')
+    machine.program("apt-get", f'echo "$@" >>{machine.folder}/apt.log; exit {0 if works else 1}')
+    for name in ("env", "rm"):
+        (machine.folder / "bin" / name).symlink_to(shutil.which(name) or name)
+    python = machine.program("half-python", f'[ "$1" = -c ] && exec {sys.executable} "$@"; exit 7')
+    only = {"PATH": str(machine.folder / "bin"), "PYTHON": str(python), "CXX": "true"}
+    result = machine.environment(CI="true", **only)
+    log = (machine.folder / "apt.log").read_text().splitlines()
+    if any("libegl1" in line or "python3-dev" in line for line in log):
+        pytest.skip("this machine lacks OpenGL or the headers of Python")
+    assert log == ["update -qq", "install -y -qq chromium"][: 2 if works else 1]
+    assert ("will not be tested in a browser" in result.stdout) != works
+    assert result.returncode == 7  # from making the environment, which comes next
+    (machine.folder / "apt.log").unlink()
+    machine.environment(CI="", **only)
+    assert not (machine.folder / "apt.log").exists()
 
 
 def test_without_permission_the_exact_line_is_printed(machine: Machine) -> None:

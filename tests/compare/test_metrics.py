@@ -4,14 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, PngImagePlugin
 
 from pipeline.compare import Limits, compare, judge, measure
-from pipeline.compare.metrics import Picture
+from pipeline.compare.pictures import Display
 from pipeline.errors import InputError
 
 
-def strands(count: int = 400, shift: float = 0.0) -> Picture:
+def strands(count: int = 400, shift: float = 0.0) -> Display:
     """A picture of thin dark lines on grey, like hair seen from near."""
     rng = np.random.default_rng(3)
     image = np.full((200, 200, 3), 150.0)
@@ -38,37 +38,81 @@ def test_gate_1_fails_on_a_single_pixel_and_gate_2_passes_it() -> None:
     changed = strands()
     changed[100, 100] += 40
     metrics = measure(strands(), changed)
-    assert judge(metrics, same_fingerprint=True) != []
-    assert judge(metrics, same_fingerprint=False) == []
+    assert judge(metrics, exact=True) != []
+    assert judge(metrics, exact=False) == []
 
 
 def test_gate_2_fails_when_the_strands_bend_otherwise() -> None:
     metrics = measure(strands(), strands(shift=6.0))
-    reasons = judge(metrics, same_fingerprint=False, limits=Limits())
+    reasons = judge(metrics, exact=False, limits=Limits())
     print(reasons)
     assert reasons != []
 
 
 def test_gate_2_fails_on_a_brighter_picture() -> None:
     brighter = np.clip(strands() * 1.04, 0, 255).astype(np.uint8)
-    reasons = judge(measure(strands(), brighter), same_fingerprint=False)
+    reasons = judge(measure(strands(), brighter), exact=False)
     assert any("luminance" in reason for reason in reasons)
 
 
-def test_folders_report_missing_pictures_and_the_page_shows_them(tmp_path: Path) -> None:
-    for folder, names in (("a", ["1.png", "2.png"]), ("b", ["2.png", "3<b>.png"])):
+def test_folders_report_what_is_missing_unreadable_or_of_another_size(tmp_path: Path) -> None:
+    for folder, names in (("a", ["1.png", "2.png", "4.png"]), ("b", ["2.png", "3.png", "4.png"])):
         (tmp_path / folder).mkdir()
         for name in names:
             Image.fromarray(strands()).save(tmp_path / folder / name)
-    page = tmp_path / "page.html"
-    found = compare(tmp_path / "a", tmp_path / "b", page)
+    Image.fromarray(strands()[:50]).save(tmp_path / "b" / "4.png")
+    found = compare(tmp_path / "a", tmp_path / "b")
     assert not found.identical
-    assert [pair.metrics is None for pair in found.pairs] == [True, False, True]
-    text = page.read_text()
-    assert "missing: the new picture" in text
-    assert "missing: the reference" in text
-    assert "3&lt;b&gt;.png" in text
-    assert "3<b>" not in text
+    assert not found.passed
+    assert [pair.reasons for pair in found.pairs] == [
+        ["the new picture is missing"],
+        [],
+        ["the reference is missing"],
+        ["pictures differ in size: 200x200 and 200x50"],
+    ]
+
+
+def test_with_limits_another_renderer_passes_and_the_same_one_does_not(tmp_path: Path) -> None:
+    changed = strands()
+    changed[100, 100] += 40
+    for name, pixels, renderer in (("a", strands(), "x"), ("b", changed, "x"), ("c", changed, "y")):
+        info = PngImagePlugin.PngInfo()
+        info.add_text("ringlet.fingerprint", renderer)
+        Image.fromarray(pixels).save(tmp_path / f"{name}.png", pnginfo=info)
+    assert not compare(tmp_path / "a.png", tmp_path / "b.png", Limits()).passed
+    assert compare(tmp_path / "a.png", tmp_path / "c.png", Limits()).passed
+    assert not compare(tmp_path / "a.png", tmp_path / "c.png").passed
+
+
+def test_linear_pictures_are_compared_beyond_white(tmp_path: Path) -> None:
+    exr = pytest.importorskip("OpenEXR")
+    bright = np.full((24, 24, 3), 4.0, np.float32)
+    brighter = bright.copy()
+    brighter[12, 12] = 8.0  # both are white on a screen
+    nan = bright.copy()
+    nan[3, 3] = np.nan
+    paths = [tmp_path / f"{name}.exr" for name in "abn"]
+    for path, pixels in zip(paths, (bright, brighter, nan), strict=True):
+        exr.File({"type": exr.scanlineimage}, {"RGB": pixels}).write(str(path))
+    found = compare(paths[0], paths[1]).pairs[0].metrics
+    assert found is not None
+    print(found)
+    assert found.changed == 1 / 24**2
+    assert found.flip > 0
+    assert not compare(paths[0], paths[2]).identical
+    assert compare(paths[2], paths[2]).identical
+    Image.fromarray(strands()[:24, :24]).save(tmp_path / "a.png")
+    with pytest.raises(InputError, match="one is linear"):
+        compare(paths[0], tmp_path / "a.png")
+
+
+def test_transparency_is_seen(tmp_path: Path) -> None:
+    pixels = np.full((16, 16, 4), 90, np.uint8)
+    pixels[..., 3] = 255
+    Image.fromarray(pixels).save(tmp_path / "a.png")
+    pixels[4, 4, 3] = 100
+    Image.fromarray(pixels).save(tmp_path / "b.png")
+    assert not compare(tmp_path / "a.png", tmp_path / "b.png").identical
 
 
 def test_bad_paths_and_pictures_give_one_clear_message(tmp_path: Path) -> None:
