@@ -52,6 +52,8 @@ class Skin:
     """(V, 3) linear RGB."""
     field: kernels.DistanceField
     """Distance to it, for its own shadow."""
+    curvature: NDArray[np.float32] | None = None
+    """(V,) [1/m]: light goes round below the skin; None where it does not."""
 
 
 @dataclass(frozen=True)
@@ -219,7 +221,7 @@ class FrameRenderer:
         rotation = pose[:3, :3]
         points = np.ascontiguousarray(skin.points @ rotation.T + pose[:3, 3], np.float32)
         normals = np.ascontiguousarray(skin.normals @ rotation.T, np.float32)
-        colours = self.lighting.shade_surface(points, normals, skin.albedo, eye)
+        colours = self.lighting.shade_surface(points, normals, skin.albedo, eye, skin.curvature)
         self.target.triangles(points, skin.triangles, colours)
 
     def _corners(

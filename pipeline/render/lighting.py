@@ -129,10 +129,16 @@ class Lighting:
         absorption = fibre.absorption(melanin, self._hair.redness)
         return kernels.shade(points, absorption, key, eye, self._finished().light, self._tables, which)
 
-    def shade_surface(self, points: _F32, normals: _F32, albedo: _F32, eye: _F64) -> _F32:
-        """Linear RGB (N, 3) float32 of points of the head (N, 3), with unit normals and linear albedo (N, 3)."""
+    def shade_surface(
+        self, points: _F32, normals: _F32, albedo: _F32, eye: _F64, curvature: _F32 | None = None
+    ) -> _F32:
+        """Linear RGB (N, 3) float32 of points of the head (N, 3), with unit normals and linear albedo (N, 3).
+
+        Curvature (N,) [1/m] lets light go round below the skin; unset, the head is flat to it.
+        """
         frame = self._finished()
-        surface = kernels.Surface(points, normals, albedo)
+        flat = np.zeros(len(points), np.float32) if curvature is None else curvature
+        surface = kernels.Surface(points, normals, albedo, flat)
         return kernels.shade_surface(surface, eye, frame.light, frame.head, frame.pose, self._loss)
 
     def _started(self) -> kernels.DensityGrid:

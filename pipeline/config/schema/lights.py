@@ -60,8 +60,8 @@ PRESETS: dict[str, Preset] = {
     ),
     "rim": Preset(  # an outline on both sides of a dim face
         (
-            Light(direction=(0.95, 0.40, -0.60), colour=_WARM, irradiance=4.5),
-            Light(direction=(-0.95, 0.40, -0.60), colour=_COOL, irradiance=4.5),
+            Light(direction=(0.95, 0.40, -0.60), colour=_WARM, irradiance=3.0),
+            Light(direction=(-0.95, 0.40, -0.60), colour=_COOL, irradiance=3.0),
             Light(direction=(0.30, 0.40, 0.95), irradiance=0.35, softness=0.6),
         ),
         (0.05, 0.05, 0.06),
