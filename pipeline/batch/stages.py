@@ -122,7 +122,11 @@ class Batch:
         """List the files that a stage leaves."""
         if stage != "render":
             return [self.file(stage)]
-        return [self.experiment.frames / f"{number:04d}.png" for number in frames or self.all_frames]
+        return [path for number in frames or self.all_frames for path in self._files(number)]
+
+    def _files(self, number: int) -> list[Path]:
+        """The files of a frame."""
+        return [self.experiment.frames / f"{number:04d}{suffix}" for suffix in self.config.render.suffixes]
 
     def _why_stale(self, stage: str, path: Path) -> str | None:
         try:
@@ -146,9 +150,9 @@ class Batch:
 
     def _state_of_frames(self, frames: range) -> State:
         """Examine frames one by one; tell the first few different reasons."""
-        missing: list[int] = []
+        missing: set[int] = set()
         stale: dict[int, str] = {}
-        for number, path in zip(frames, self.outputs("render", frames), strict=True):
+        for number, path in ((n, path) for n in frames for path in self._files(n)):
             try:
                 if path.exists() and _verified.get(_identity(path)) == self.keys["render"]:
                     continue
@@ -157,7 +161,7 @@ class Batch:
                 if key != self.keys["render"]:
                     stale[number] = self._difference("render", provenance)
             except cache.Missing:
-                missing.append(number)
+                missing.add(number)
             except cache.Damaged as error:
                 stale[number] = str(error)
         if not missing and not stale:
@@ -165,7 +169,7 @@ class Batch:
         reasons = list(dict.fromkeys(stale.values()))[:_REASONS_SHOWN]
         if missing:
             reasons.append(f"{len(missing)} of {len(frames)} frames not made yet")
-        return State("render", "; ".join(reasons), tuple(sorted([*missing, *stale])))
+        return State("render", "; ".join(reasons), tuple(sorted(missing | stale.keys())))
 
 
 def _identity(path: Path) -> tuple[int, ...]:

@@ -4,7 +4,7 @@ from pipeline.cache.atomic import replacing
 from pipeline.cache.columns import Column, ColumnWriter, Damaged
 from pipeline.cache.experiment import Experiment
 from pipeline.cache.guides import GuidesReader, GuidesWriter, create_guides, open_guides
-from pipeline.cache.pictures import picture_record, write_picture
+from pipeline.cache.pictures import picture_record, write_layers, write_picture
 from pipeline.cache.segments import Frame, Segments
 from pipeline.cache.sharing import Sharing
 from pipeline.cache.store import Missing, Reader, Writer, create, open
@@ -28,5 +28,6 @@ __all__ = [
     "open_guides",
     "picture_record",
     "replacing",
+    "write_layers",
     "write_picture",
 ]

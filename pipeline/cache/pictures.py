@@ -1,15 +1,16 @@
-"""Frames: PNG files that appear whole and that say in their text chunks what they were made from."""
+"""Frames: PNG and EXR files that appear whole and that say in their headers what they were made from."""
 
 import io
 import json
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.cache import png
+from pipeline.cache import exr, png
 from pipeline.cache.atomic import replacing
 from pipeline.cache.columns import Damaged
 from pipeline.cache.store import Missing
@@ -27,23 +28,43 @@ def write_picture(
     Text chunks: ringlet.key, ringlet.provenance (JSON) and ringlet.<name> for each of `texts`.
     Raises InputError when the disk is full.
     """
-    texts |= {"key": key, "provenance": json.dumps(provenance, sort_keys=True)}
-    data = png.encode(pixels, {f"ringlet.{name}": text for name, text in texts.items()})
+    data = png.encode(pixels, _texts(key, provenance, texts))
     with replacing(path) as temporary:
         temporary.write_bytes(data)
 
 
-def picture_record(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return key and provenance of a frame after checking every byte of it; raises Missing or Damaged."""
-    from PIL import Image
+def write_layers(
+    path: Path, layers: Mapping[str, NDArray[Any]], key: str, provenance: dict[str, Any], **texts: str
+) -> None:
+    """Write layers (H, W), float16, float32 or uint32, as an EXR file by their channels' names, whole or not at all.
 
+    String attributes: as the text chunks of `write_picture`. Raises InputError when OpenEXR is not installed or the
+    disk is full.
+    """
+    with replacing(path) as temporary:
+        exr.write(temporary, layers, _texts(key, provenance, texts))
+
+
+def picture_record(path: Path) -> tuple[str, dict[str, Any]]:
+    """Return key and provenance of a frame, PNG or EXR, after checking every byte of it; raises Missing or Damaged."""
     try:
         data = path.read_bytes()
-        png.verify(data)
-        with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
-            info = picture.info
+        info = exr.texts(data) if path.suffix == ".exr" else _png_texts(data)
         return info["ringlet.key"], json.loads(info["ringlet.provenance"])
     except FileNotFoundError:
         raise Missing(path) from None
     except (OSError, SyntaxError, LookupError, ValueError, TypeError, struct.error) as error:
         raise Damaged(path, "not a frame of ringlet, or broken") from error
+
+
+def _png_texts(data: bytes) -> dict[str, Any]:
+    from PIL import Image
+
+    png.verify(data)
+    with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
+        return {str(name): value for name, value in picture.info.items()}
+
+
+def _texts(key: str, provenance: dict[str, Any], texts: dict[str, str]) -> dict[str, str]:
+    texts = texts | {"key": key, "provenance": json.dumps(provenance, sort_keys=True)}
+    return {f"ringlet.{name}": text for name, text in texts.items()}

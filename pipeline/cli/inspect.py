@@ -13,7 +13,7 @@ def contents(path: Path) -> dict[str, Any]:
     """
     found: dict[str, Any] = dict.fromkeys(("kind", "key", "strands", "points", "frames"))
     try:
-        found |= _picture(path) if path.suffix == ".png" else _columns(path)
+        found |= _picture(path) if path.suffix in (".png", ".exr") else _columns(path)
     except cache.Damaged as error:
         return found | {"valid": False, "problem": str(error)}
     return found | {"valid": True}

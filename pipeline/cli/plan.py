@@ -88,7 +88,7 @@ def _simulate(config: Config) -> Cost:
     seconds = _START_S + _STEP_S_PER_POINT[simulate.precision] * points * steps * _slower()
     return Cost(
         _START_GB + (_GUIDE_B_PER_POINT * points + _READ_B_PER_STRAND * config.groom.strands) / _GB,
-        simulate.frames * 12 * points * _DEFLATED / _GB,
+        simulate.frames * simulate.states * 12 * points * _DEFLATED / _GB,
         seconds,
     )
 
@@ -111,6 +111,9 @@ def _render(config: Config) -> Cost:
     pixels = render.size[0] * render.size[1]
     samples = pixels * render.samples**2
     frame = _RENDER_S_PER_POINT * points * _slower() + _RENDER_S_PER_SAMPLE * samples * _slower()
+    camera = config.scene.camera
+    if camera.shutter or camera.f_stop is not None:
+        frame *= render.passes
     all_points = 12 * strands * config.groom.points
     kept = all_points if all_points <= _KEPT_B else 0
     in_flight = points * min(1.0, _IN_FLIGHT / strands)

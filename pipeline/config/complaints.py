@@ -26,7 +26,9 @@ _PHRASES = {
 
 def complaints(error: ValidationError, tree: Tree, path: Path) -> list[str]:
     """One line for every error, in the order of the files' lines."""
-    found = [_complaint(dict(detail), tree, path) for detail in error.errors(include_url=False)]
+    details = [dict(detail) for detail in error.errors(include_url=False)]
+    # A default that follows from a wrong value is no error of its own
+    found = [_complaint(each, tree, path) for each in details if each["type"] != "default_factory_not_called"]
     return [line for _, line in sorted(dict.fromkeys(found))]
 
 

@@ -7,13 +7,14 @@ import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from pipeline.config.complaints import complaints
-from pipeline.config.schema import Config
+from pipeline.config.schema import PRESETS, Config
 from pipeline.config.sequence import numbered_files
 from pipeline.config.toml_lines import key_lines
 from pipeline.config.tree import KeyPath, Tree, dotted, parse_key
@@ -81,7 +82,7 @@ def validated(tree: Tree, path: Path, files: tuple[Path, ...]) -> tuple[Loaded |
 
 def set_value(tree: Tree, path: KeyPath, value: Any, origin: str, folder: Path) -> None:
     """Set one value; names of files in it are relative to `folder`. Raises LookupError with a sentence."""
-    tree.set(path, value, origin, _defaults)
+    tree.set(path, value, origin, partial(_defaults, tree))
     named = (key for key in _naming(tree.values, (*FILES, *SEQUENCES)) if key[: len(path)] == path)
     tree.anchor |= dict.fromkeys(named, folder)
 
@@ -186,9 +187,11 @@ def _scalar(value: str) -> Any:
         return value
 
 
-def _defaults(path: KeyPath) -> Any:
-    """Look up the default of a list, of which an override sets one element."""
-    value: Any = Config(name="default").model_dump(mode="json")
+def _defaults(tree: Tree, path: KeyPath) -> Any:
+    """Look up the default of a list, of which an override sets one element; that of lights is their preset's."""
+    lighting = tree.get(("scene", "lighting"))
+    preset = {"scene": {"lighting": lighting}} if lighting in PRESETS else {}
+    value: Any = Config.model_validate({"name": "default"} | preset).model_dump(mode="json")
     for part in path:
         value = value[part]
     return value

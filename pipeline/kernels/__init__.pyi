@@ -745,13 +745,15 @@ def shade(
 class Surface:
     """Points of the head's surface."""
 
-    def __init__(self, points: _F32, normals: _F32, albedo: _F32) -> None:
-        """Three arrays (N, 3) float32: world positions [m], unit outward normals, linear R, G, B in [0, 1]."""
+    def __init__(self, points: _F32, normals: _F32, albedo: _F32, curvature: _F32) -> None:
+        """Three arrays (N, 3) float32: world positions [m], unit outward normals, linear R, G, B in [0, 1]; (N,) [1/m]."""
 
 def shade_surface(
     surface: Surface, eye: _F64, light: Illumination, field: DistanceField | None, pose: _F64, loss: _F32
 ) -> _F32:
-    """Radiance (N, 3) float32 of the head towards the eye (3,): Lambert and a soft sheen, in the shadow of hair and head.
+    """Radiance (N, 3) float32 of the head towards the eye (3,): skin, in the shadow of hair and head.
+
+    Light goes round where the surface is curved, red the farthest; where it is flat skin is Lambertian, with a gloss.
 
     Args:
         surface: what is lit.

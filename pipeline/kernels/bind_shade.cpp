@@ -96,12 +96,14 @@ static Radiance shade_strands(Strands points, Triples absorption, Array<const ui
 /// The surface with the arrays that it points into.
 struct HeldSurface {
     Triples points, normals, albedo;
+    Array<const float, -1> curvature;
 };
 
-static void make_surface(HeldSurface *held, Triples points, Triples normals, Triples albedo) {
-    require(normals.shape(0) == points.shape(0) && albedo.shape(0) == points.shape(0),
-            "Surface: points, normals and albedo differ in shape");
-    new (held) HeldSurface{points, normals, albedo};
+static void make_surface(HeldSurface *held, Triples points, Triples normals, Triples albedo,
+                         Array<const float, -1> curvature) {
+    require(normals.shape(0) == points.shape(0) && albedo.shape(0) == points.shape(0) && curvature.shape(0) == points.shape(0),
+            "Surface: points, normals, albedo and curvature differ in shape");
+    new (held) HeldSurface{points, normals, albedo, curvature};
 }
 
 static Radiance shade_head(const HeldSurface &surface, Point eye, const HeldLight &light, const DistanceField *field,
@@ -109,7 +111,8 @@ static Radiance shade_head(const HeldSurface &surface, Point eye, const HeldLigh
     const size_t N = surface.points.shape(0);
     auto radiance = new_array<float>({N, size_t(3)});
     const double *e = eye.data();
-    const SurfacePoints points{surface.points.data(), surface.normals.data(), surface.albedo.data(), {e[0], e[1], e[2]}};
+    const SurfacePoints points{surface.points.data(), surface.normals.data(), surface.albedo.data(),
+                               surface.curvature.data(), {e[0], e[1], e[2]}};
     const Occluder head{field, Rigid<float>(Pose::of(pose.data()).inverse())};
     float *out = radiance.data();
     nb::gil_scoped_release release;
@@ -128,7 +131,7 @@ void bind_shade(nb::module_ &m) {
         .def_rw("spacing", &HeldLight::spacing)
         .def_rw("glints", &HeldLight::glints);
     nb::class_<HeldSurface>(m, "Surface")
-        .def("__init__", &make_surface, nb::arg("points"), nb::arg("normals"), nb::arg("albedo"));
+        .def("__init__", &make_surface, nb::arg("points"), nb::arg("normals"), nb::arg("albedo"), nb::arg("curvature"));
     m.def("shade", &shade_strands, nb::arg("points"), nb::arg("absorption"), nb::arg("key"), nb::arg("eye"),
           nb::arg("light"), nb::arg("tables"),
           nb::arg("which") = nb::none());

@@ -1,9 +1,10 @@
-// Radiance of the head's surface towards the eye: Lambert and a soft sheen, in the shadow of hair and of itself.
+// Radiance of the head's surface towards the eye: skin (skin.hpp) in the shadow of hair and of itself.
 #pragma once
 
 #include "distance_field.hpp"
 #include "illumination.hpp"
 #include "pose.hpp"
+#include "skin.hpp"
 
 #include <optional>
 
@@ -11,6 +12,7 @@ namespace ringlet {
 
 struct SurfacePoints {
     const float *points, *normals, *albedo; // (N, 3) world [m], unit, linear R, G, B
+    const float *curvature;                 // (N,) [1/m]
     double eye[3];
 };
 
@@ -23,6 +25,7 @@ struct Occluder {
 /// 16 points of the surface.
 struct SkinPoints {
     Vec3<float> x, normal, to_eye, albedo;
+    Floats curvature;
 };
 
 inline Vec3<float> read16(const float *values, size_t first, size_t count) {
@@ -93,14 +96,18 @@ RINGLET_INLINE Floats outside(const Illumination &light, const Vec3<float> &g) {
     return clamp(farthest * (16.0f / std::max({light.n[0], light.n[1], light.n[2]})), 0, 1);
 }
 
-/// Sheen: Blinn-Phong with exponent 32 and Schlick's Fresnel at a skin's 3 %; times N.L.
-RINGLET_INLINE Floats sheen(const SkinPoints &p, const Vec3<float> &L, Floats facing) {
+/// The way to the light, bent up until it clears the surface that it starts from: whether light reaches round a curve is
+/// the skin's to say, not the shadow's.
+RINGLET_INLINE Vec3<float> clear_of(const Vec3<float> &normal, const Vec3<float> &L, Floats c) {
+    const Vec3<float> up = L + maximum<float>(0.15f - c, splat(0.0f)) * normal;
+    return (1.0f / square_root<float>(dot(up, up) + 1e-12f)) * up;
+}
+
+RINGLET_INLINE Floats gloss(const SkinPoints &p, const Vec3<float> &L, Floats facing) {
     const Vec3<float> middle = p.to_eye + L;
-    const Vec3<float> half = (1.0f / square_root<float>(dot(middle, middle) + 1e-12f)) * middle;
-    Floats power = maximum<float>(dot(p.normal, half), splat(0.0f)), miss = 1.0f - maximum<float>(dot(half, L), splat(0.0f));
-    for (int i = 0; i < 5; ++i) power = power * power;
-    miss = miss * miss * miss * miss * miss;
-    return (0.028f + 0.972f * miss) * power * facing * (34 / (8 * 3.14159265f));
+    const Floats square = dot(middle, middle);
+    const Vec3<float> half = (1.0f / square_root<float>(square + 1e-12f)) * middle;
+    return gloss(dot(p.normal, half), dot(half, L), square, facing);
 }
 
 inline void light_skin(const SkinPoints &p, const Illumination &light, const Occluder &head, const float loss[3],
@@ -117,12 +124,15 @@ inline void light_skin(const SkinPoints &p, const Illumination &light, const Occ
     }
     for (int l = 0; l < light.lights; ++l) {
         const Vec3<float> L = light.direction(l);
-        const Floats facing = maximum<float>(dot(p.normal, L), splat(0.0f));
-        if (!any<float>(facing > 0.0f)) continue;
-        const Floats open = past_head(head, p, L), n = fibres(light, l, g), gloss = sheen(p, L, facing);
+        const Floats cosine = dot(p.normal, L);
+        if (!any<float>(cosine + kSkinReach * p.curvature > 0.0f)) continue;
+        const Floats open = past_head(head, p, clear_of(p.normal, L, cosine)), n = fibres(light, l, g);
+        const Floats shine = gloss(p, L, maximum<float>(cosine, splat(0.0f)));
+        Floats diffuse[3];
+        scattered(cosine, p.curvature, diffuse);
         for (int c = 0; c < 3; ++c)
             radiance[c] += light.irradiance[3 * l + c] * open * exponential(-loss[c] * n) *
-                           (albedo[c] * facing * (1 / 3.14159265f) + gloss);
+                           (albedo[c] * diffuse[c] * (1 / 3.14159265f) + shine);
     }
 }
 
@@ -134,7 +144,8 @@ inline void shade_surface(const SurfacePoints &surface, size_t count, const Illu
     for (ptrdiff_t block = 0; block < blocks; ++block) {
         const size_t first = 16 * size_t(block);
         SkinPoints p{read16(surface.points, first, count), read16(surface.normals, first, count), {},
-                     read16(surface.albedo, first, count)};
+                     read16(surface.albedo, first, count), {}};
+        for (int i = 0; i < 16; ++i) p.curvature[i] = surface.curvature[std::min(first + i, count - 1)];
         const Vec3<float> eye{splat(float(surface.eye[0])), splat(float(surface.eye[1])), splat(float(surface.eye[2]))};
         const Vec3<float> way = eye - p.x;
         p.to_eye = (1.0f / square_root<float>(dot(way, way) + 1e-12f)) * way;

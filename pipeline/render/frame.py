@@ -14,7 +14,7 @@ from pipeline.render.camera import CameraPath
 from pipeline.render.coverage import Coverage
 from pipeline.render.geometry import (
     Shape,
-    choose_shape,
+    choose_shapes,
     drawn_width,
     projected_width,
     ribbons,
@@ -52,6 +52,8 @@ class Skin:
     """(V, 3) linear RGB."""
     field: kernels.DistanceField
     """Distance to it, for its own shadow."""
+    curvature: NDArray[np.float32] | None = None
+    """(V,) [1/m]: light goes round below the skin; None where it does not."""
 
 
 @dataclass(frozen=True)
@@ -94,11 +96,15 @@ class FrameRenderer:
         self._lit: Moment | None = None
         self._kept: list[tuple[int, Points]] = []
 
-    def shape(self, moment: Moment, view: View | None = None) -> tuple[Shape, float]:
-        """How strands are drawn at a moment, and their projected width [px]."""
+    def pixels(self, moment: Moment, view: View | None = None) -> float:
+        """Projected width [px] of strands at a moment."""
         middle = moment.guides.reshape(-1, 3).mean(axis=0, dtype=np.float64)
-        pixels = projected_width(self.render, view or self.camera, self.width, middle)
-        return choose_shape(self.render, pixels), pixels
+        return projected_width(self.render, view or self.camera, self.width, middle)
+
+    def shape(self, moment: Moment, view: View | None = None) -> tuple[str, float]:
+        """How strands are drawn at a moment, "coverage and tubes" where one fades into the other, and their width [px]."""
+        pixels = self.pixels(moment, view)
+        return " and ".join(shape for shape, _ in choose_shapes(self.render, pixels)), pixels
 
     def frame(self, moment: Moment) -> Pixels:
         """Render a moment: sRGB (H, W, 3), of as many bits as the config says."""
@@ -115,13 +121,21 @@ class FrameRenderer:
         the moment of the call before, the same object, is there already.
         """
         camera = view or self.camera
+        pixels = self.pixels(moment, camera)
+        parts = choose_shapes(self.render, pixels)
+        if len(parts) == 1:
+            return self._picture(moment, camera, parts[0][0], pixels)
+        pictures = [self._picture(moment, camera, shape, pixels) * np.float32(part) for shape, part in parts]
+        return np.asarray(pictures[0] + pictures[1])
+
+    def _picture(self, moment: Moment, camera: View, shape: Shape, pixels: float) -> Linear:
+        """The linear picture with all strands drawn in one shape, which are so wide [px]."""
         if moment is not self._lit:
             self.strands.frame(moment.guides, moment.pose, moment.moved)
         # Whole margins: the grid of shadows stands still while hair moves a little, so that nothing shimmers
         lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
         upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
         self.target.clear(camera, *self._depths(camera, self._corners(moment, lower, upper)))
-        shape, pixels = self.shape(moment, camera)
         coverage = Coverage(self.target, self.render.size, camera) if shape == "coverage" else None
         if moment is not self._lit:
             self._kept = self._light(moment, lower, upper, coverage)
@@ -219,7 +233,7 @@ class FrameRenderer:
         rotation = pose[:3, :3]
         points = np.ascontiguousarray(skin.points @ rotation.T + pose[:3, 3], np.float32)
         normals = np.ascontiguousarray(skin.normals @ rotation.T, np.float32)
-        colours = self.lighting.shade_surface(points, normals, skin.albedo, eye)
+        colours = self.lighting.shade_surface(points, normals, skin.albedo, eye, skin.curvature)
         self.target.triangles(points, skin.triangles, colours)
 
     def _corners(

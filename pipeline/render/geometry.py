@@ -13,7 +13,10 @@ Points = NDArray[np.float32]
 Which = NDArray[np.uint32]
 Shape = Literal["tubes", "ribbons", "lines", "coverage"]
 
-TUBES_FROM = 3.0  # [px] projected width where `auto` changes from coverage to tubes: from there on their roundness shows
+TUBES_FROM = (
+    3.0  # [px] projected width from which `auto` fades from coverage to tubes: their roundness begins to show
+)
+TUBES_ALONE = 4.0  # [px] and from which it draws tubes alone
 
 _FIBRE = 80e-6  # [m] a human hair's diameter
 _FULL = 100_000  # strands of a full head
@@ -40,11 +43,17 @@ def projected_width(render: Render, camera: View, width: float, middle: NDArray[
     return float(width / visible * render.size[1])
 
 
-def choose_shape(render: Render, pixels: float) -> Shape:
-    """The shape that the config asks for, or the one that fits a projected width [px]."""
+def choose_shapes(render: Render, pixels: float) -> tuple[tuple[Shape, float], ...]:
+    """The shape that the config asks for, or those that fit a projected width [px], and their parts of the picture.
+
+    Between coverage and tubes a picture is both: in a zoom nothing pops.
+    """
     if render.geometry != "auto":
-        return render.geometry
-    return "tubes" if pixels >= TUBES_FROM else "coverage"
+        return ((render.geometry, 1.0),)
+    t = min(max((pixels - TUBES_FROM) / (TUBES_ALONE - TUBES_FROM), 0.0), 1.0)
+    tubes = t * t * (3 - 2 * t)
+    both: tuple[tuple[Shape, float], ...] = (("coverage", 1 - tubes), ("tubes", tubes))
+    return tuple((shape, part) for shape, part in both if part > 0)
 
 
 def taper(render: Render, points: int) -> NDArray[np.float32]:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import kernels
-from pipeline.config.schema import Fibre, Light, Scene
+from pipeline.config.schema import Fibre, Scene
 from pipeline.render import fibre
+from pipeline.render.lights import as_directions
 from pipeline.render.veil import Veil
 
 _F32 = NDArray[np.float32]
@@ -25,11 +26,6 @@ _OPAQUE: Final = 4
 """Times that the head is denser for the eye than for light: two voxels of it hide everything."""
 
 
-def _unit(direction: tuple[float, float, float]) -> _F64:
-    vector = np.array(direction, np.float64)
-    return vector / np.linalg.norm(vector)
-
-
 def _evenly_spread(count: int) -> _F32:
     """Unit directions (count, 3) on a Fibonacci spiral."""
     i = np.arange(count) + 0.5
@@ -37,10 +33,6 @@ def _evenly_spread(count: int) -> _F32:
     turn = i * np.pi * (3 - np.sqrt(5))
     r = np.sqrt(1 - z**2)
     return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).astype(np.float32)
-
-
-def _irradiance(light: Light) -> list[float]:
-    return [light.irradiance * channel for channel in light.colour]
 
 
 @dataclass(frozen=True)
@@ -63,10 +55,7 @@ class Lighting:
         """Prepare what does not change from frame to frame: `grid` voxels along the longest side of the hair."""
         self._hair = hair
         self._voxels = grid
-        self._directions = np.array([_unit(light.direction) for light in scene.lights], np.float32).reshape(
-            -1, 3
-        )
-        self._irradiance = np.array([_irradiance(light) for light in scene.lights], np.float32).reshape(-1, 3)
+        self._directions, self._irradiance = as_directions(scene.lights)
         self._sky = np.array(scene.environment, np.float32)
         scattering = fibre.Scattering(hair.roughness, hair.azimuthal_roughness, hair.tilt)
         self._tables = scattering.tables()
@@ -140,10 +129,16 @@ class Lighting:
         absorption = fibre.absorption(melanin, self._hair.redness)
         return kernels.shade(points, absorption, key, eye, self._finished().light, self._tables, which)
 
-    def shade_surface(self, points: _F32, normals: _F32, albedo: _F32, eye: _F64) -> _F32:
-        """Linear RGB (N, 3) float32 of points of the head (N, 3), with unit normals and linear albedo (N, 3)."""
+    def shade_surface(
+        self, points: _F32, normals: _F32, albedo: _F32, eye: _F64, curvature: _F32 | None = None
+    ) -> _F32:
+        """Linear RGB (N, 3) float32 of points of the head (N, 3), with unit normals and linear albedo (N, 3).
+
+        Curvature (N,) [1/m] lets light go round below the skin; unset, the head is flat to it.
+        """
         frame = self._finished()
-        surface = kernels.Surface(points, normals, albedo)
+        flat = np.zeros(len(points), np.float32) if curvature is None else curvature
+        surface = kernels.Surface(points, normals, albedo, flat)
         return kernels.shade_surface(surface, eye, frame.light, frame.head, frame.pose, self._loss)
 
     def _started(self) -> kernels.DensityGrid:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pipeline import cache, kernels
+from pipeline.body.normals import point_curvature
 from pipeline.cache.expansion import body_frames, distance_field, expansion_from, placement
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
@@ -135,10 +136,12 @@ def _skin(groom: cache.Reader) -> Skin | None:
     field = distance_field(groom)
     if field is None:
         return None
+    points, normals, triangles = (groom[f"head/{name}"][:] for name in ("points", "normals", "triangles"))
     return Skin(
-        points=groom["head/points"][:],
-        triangles=groom["head/triangles"][:],
-        normals=groom["head/normals"][:],
+        points=points,
+        triangles=triangles,
+        normals=normals,
         albedo=groom["head/albedo"][:],
         field=field,
+        curvature=point_curvature(points, normals, triangles).astype(np.float32),
     )

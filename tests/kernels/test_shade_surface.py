@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline import kernels
+from pipeline.body.normals import point_curvature
 from pipeline.config.schema import Fibre, Light, Scene
 from pipeline.render.lighting import Lighting
 
@@ -69,6 +70,70 @@ def test_bare_head_is_lambertian_and_dark_on_the_far_side() -> None:
     assert error < 0.05
     assert shaded[normals[:, 1] < 0].max() == 0
     assert (shaded >= 0).all()
+
+
+@pytest.mark.parametrize("radius", [0.1, 0.02, 0.01])
+def test_light_goes_round_a_curve_as_the_profile_blurs_it_on_a_ring(radius: float) -> None:
+    """Against the integral over the ring of the cosine and the Gaussians of Gems 3 (variances in mm^2)."""
+    variance = np.array([0.0064, 0.0484, 0.187, 0.567, 1.99, 7.41])
+    weight = np.array(
+        [
+            [0.233, 0.455, 0.649],
+            [0.100, 0.336, 0.344],
+            [0.118, 0.198, 0.0],
+            [0.113, 0.007, 0.007],
+            [0.358, 0.004, 0.0],
+            [0.078, 0.0, 0.0],
+        ]
+    )
+    angle = np.linspace(0, np.pi, 181)
+    normals = np.stack([np.sin(angle), np.cos(angle), 0 * angle], axis=-1).astype(np.float32)
+    curvature = np.full(len(angle), 1 / radius, np.float32)
+    lighting = lit(SUN, ONE_HAIR, None)
+    far = (normals * np.float32(10), normals)  # far from the hair
+    shaded, gloss = (
+        lighting.shade_surface(*far, np.full_like(normals, albedo), EYE, curvature) for albedo in (1.0, 0.0)
+    )
+    x = np.linspace(-1.2, 1.2, 4801)
+    blurred = np.zeros((len(angle), 3))
+    for v, w in zip(variance, weight, strict=True):
+        profile = np.exp(-0.5 * (x * radius * 1e3) ** 2 / v)
+        mean = np.maximum(np.cos(angle[:, None] + x), 0) @ (profile / profile.sum())
+        blurred += mean[:, None] * w
+    error = np.abs((shaded - gloss) - 2.0 / np.pi * blurred).max(axis=0)
+    beyond = (shaded - gloss)[100] / (2.0 / np.pi)
+    print(f"radius {1e3 * radius:.0f} mm: off by {error}; ten degrees beyond the terminator {beyond}")
+    assert error.max() < 2e-3
+    assert beyond[0] >= beyond[1] >= beyond[2]
+    if radius < 0.05:
+        assert beyond[0] > 5e-4
+
+
+def test_the_gloss_of_skin_reflects_a_few_per_cent_and_more_at_grazing_angles() -> None:
+    """Albedo of the gloss: its integral over directions of the eye, from light at 0, 60 and 80 degrees."""
+    out = directions(4000)
+    out = out[out[:, 1] > 0]
+    albedo = []
+    for slant in np.radians([0.0, 60.0, 80.0]):
+        light = Light(direction=(float(np.sin(slant)), float(np.cos(slant)), 0), irradiance=1.0)
+        lighting = lit(Scene(lights=(light,), environment=(0, 0, 0)), ONE_HAIR, None)
+        up = np.array([[0, 1, 0]], np.float32)
+        seen = [lighting.shade_surface(up * 9, up, 0 * up, up[0] * 9.0 + 5.0 * eye)[0, 0] for eye in out[::4]]
+        radiosity = 2 * np.pi * np.mean(np.array(seen) * out[::4, 1])
+        albedo.append(radiosity / np.cos(slant))
+    print(f"gloss at 0, 60, 80 degrees: {albedo}")
+    assert 0.02 < albedo[0] < 0.04
+    assert albedo[0] < albedo[1] < albedo[2] < 1
+
+
+def test_curvature_of_a_sphere_is_one_over_its_radius() -> None:
+    import pyvista as pv
+
+    mesh = pv.Icosphere(radius=0.05, nsub=3)
+    points = np.asarray(mesh.points)
+    found = point_curvature(points, points / 0.05, mesh.regular_faces)
+    print(f"curvature {found.min():.3f} to {found.max():.3f}, expected 20")
+    assert np.allclose(found, 20, rtol=1e-3)
 
 
 def test_head_shadows_itself_beyond_its_own_normals() -> None:

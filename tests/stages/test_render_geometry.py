@@ -6,14 +6,24 @@ import pytest
 from pipeline.body.placement import Placement
 from pipeline.config.schema import Camera, Render
 from pipeline.render.camera import CameraPath
-from pipeline.render.geometry import choose_shape, drawn_width, projected_width, ribbons, smooth, taper
+from pipeline.render.geometry import choose_shapes, drawn_width, projected_width, ribbons, smooth, taper
 from pipeline.render.target import BRIGHTEST, DECODED, encode
 
 
-@pytest.mark.parametrize(("pixels", "shape"), [(0.2, "coverage"), (1.5, "coverage"), (3.5, "tubes")])
+@pytest.mark.parametrize(("pixels", "shape"), [(0.2, "coverage"), (3.0, "coverage"), (4.0, "tubes")])
 def test_auto_draws_by_projected_width(pixels: float, shape: str) -> None:
-    assert choose_shape(Render(), pixels) == shape
-    assert choose_shape(Render(geometry="lines"), pixels) == "lines"
+    assert choose_shapes(Render(), pixels) == ((shape, 1.0),)
+    assert choose_shapes(Render(geometry="lines"), pixels) == (("lines", 1.0),)
+
+
+def test_auto_fades_from_coverage_to_tubes_without_a_step() -> None:
+    widths = np.linspace(2.9, 4.1, 241)
+    parts = [dict(choose_shapes(Render(), width)) for width in widths]
+    tubes = np.array([part.get("tubes", 0.0) for part in parts])
+    assert all(sum(part.values()) == pytest.approx(1) for part in parts)
+    assert (np.diff(tubes) >= 0).all()
+    assert (tubes[0], tubes[-1]) == (0, 1)
+    assert np.diff(tubes).max() < 0.01
 
 
 def test_projected_width_is_that_of_a_pinhole_camera() -> None:

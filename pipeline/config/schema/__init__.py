@@ -13,10 +13,11 @@ from pipeline.config.schema.camera import Camera, CameraKeyframe, open_states
 from pipeline.config.schema.groom import Groom, Swatch
 from pipeline.config.schema.hair_contact import HairContact
 from pipeline.config.schema.interpolate import Interpolate, Variation
+from pipeline.config.schema.lights import PRESETS, Light
 from pipeline.config.schema.partings import Parting
 from pipeline.config.schema.render import Fibre, Render
 from pipeline.config.schema.scalp import Plane, Scalp
-from pipeline.config.schema.scene import Light, Scene
+from pipeline.config.schema.scene import Scene
 from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, SagFree, Simulate
 from pipeline.config.schema.style import (
     AnyOperator,
@@ -38,6 +39,7 @@ from pipeline.config.schema.sweep import Sweep
 from pipeline.config.schema.varying import Varied, VariedAngle, VariedFraction, VariedLength
 
 __all__ = [
+    "PRESETS",
     "Air",
     "AnyOperator",
     "Bend",

@@ -55,8 +55,15 @@ class Render(Section):
     """Tone curve: "soft" is linear up to 0.6, with highlights rolled off; "filmic" has a film's contrast, and room for light up to 7."""
     bits: Literal[8, 16] = 8
     """Bits a channel of the PNG files."""
+    exr: bool = False
+    """Also write every frame as an OpenEXR file of linear colours, depth, tangents, strand numbers and coverage; needs the extra "exr"."""
     hair: Fibre = Fibre()
     """Colour and gloss of the fibres."""
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """Of the files of a frame."""
+        return (".png", ".exr") if self.exr else (".png",)
 
     @property
     def gain(self) -> float:

@@ -4,17 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.config.schema.base import Colour, FaceAxis, Section, Vector
+from pipeline.config.schema.base import Colour, FaceAxis, Section
 from pipeline.config.schema.camera import Camera
-
-
-class Light(Section):
-    direction: Vector
-    """From the scene towards the light; normalised on use."""
-    colour: Colour = (1.0, 1.0, 1.0)
-    """Linear RGB."""
-    irradiance: Annotated[float, Field(ge=0)] = 1.0
-    """Irradiance on a surface that faces the light [W/m^2]; multiplies the colour."""
+from pipeline.config.schema.lights import Light, Lighting, preset_of
 
 
 class Scene(Section):
@@ -32,14 +24,12 @@ class Scene(Section):
     """Tone of the skin."""
     background: Colour = (0.2, 0.2, 0.2)
     """Linear RGB behind everything."""
-    environment: Colour = (0.16, 0.16, 0.16)
-    """Linear RGB radiance of a constant sky that lights everything."""
-    lights: tuple[Light, ...] = (
-        Light(direction=(0.55, 0.75, 0.80), colour=(1.0, 0.96, 0.9), irradiance=3.2),
-        Light(direction=(-0.90, 0.25, 0.60), colour=(0.85, 0.92, 1.0), irradiance=0.8),
-        Light(direction=(-0.45, 0.55, -0.90), irradiance=2.5),
-    )
-    """Directional lights: key, fill and rim by default."""
+    lighting: Lighting = "studio"
+    """Preset of lights and environment, where these are not set: "studio" (key, fill and rim), "soft" (large windows), "butterfly" (high in front), "rim" (both edges), "back" (through the hair), "sun", "overcast" or "dusk"."""
+    environment: Colour = Field(default_factory=lambda scene: preset_of(scene).environment)
+    """Linear RGB radiance of a constant sky that lights everything; unset, the preset's."""
+    lights: tuple[Light, ...] = Field(default_factory=lambda scene: preset_of(scene).lights)
+    """Directional lights; unset, the preset's."""
     camera: Camera = Camera()
     """The camera."""
 
