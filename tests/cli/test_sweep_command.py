@@ -91,7 +91,10 @@ def test_the_table_has_values_metrics_times_and_paths_of_every_run(sweep: Sweep)
         for picture in row["pictures"]:
             assert (sweep.outputs / "x" / picture).is_file()
         assert len(row["pictures"]) == row["frames"] == 2
-        assert all((stage["seconds"] is None) == (stage["shared_with"] is not None) for stage in row["stages"].values())
+        assert all(
+            (stage["seconds"] is None) == (stage["shared_with"] is not None)
+            for stage in row["stages"].values()
+        )
     owners = [row["stages"]["simulate"]["shared_with"] for row in table["runs"]]
     names = [row["name"] for row in table["runs"]]
     assert owners == [None, names[0], None, names[2]]

@@ -1,6 +1,5 @@
 """Nothing pops or flickers: in a zoom from shape to shape, under a camera that moves, in hair that moves."""
 
-
 import numpy as np
 from numpy.typing import NDArray
 from test_render_frame import config, expansion
