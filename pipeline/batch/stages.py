@@ -67,12 +67,14 @@ class Batch:
                 if not state.fresh:
                     self._renew(stage, state)
         elif stage != "render":
-            self.sharing.note(self.keys[stage])
+            with cache.where_writable():
+                self.sharing.note(self.keys[stage])
         if touch and state.fresh:
             say(stage, "fresh")
         if touch:
-            for path in self.outputs(stage, frames):
-                _touch(path)
+            with cache.where_writable():
+                for path in self.outputs(stage, frames):
+                    _touch(path)
 
     def _renew(self, stage: str, state: State) -> None:
         """Take the file from another experiment that has it, else make it."""
@@ -180,7 +182,7 @@ def _identity(path: Path) -> tuple[int, ...]:
 
 def _touch(path: Path) -> None:
     """Give a file the current time, without having to verify it again."""
-    key = _verified.pop(_identity(path), None)
+    key = _verified.get(_identity(path))
     os.utime(path)
     if key is not None:
         _verified[_identity(path)] = key
