@@ -69,12 +69,20 @@ class Batch:
         elif stage != "render":
             with cache.where_writable():
                 self.sharing.note(self.keys[stage])
+                self._tidy(stage)
         if touch and state.fresh:
             say(stage, "fresh")
         if touch:
             with cache.where_writable():
                 for path in self.outputs(stage, frames):
                     _touch(path)
+
+    def _tidy(self, stage: str) -> None:
+        """Remove the segments of a simulation that was killed after its last frame, when they had been put together."""
+        segments = cache.Segments(self.file("simulate"), self.keys["simulate"])
+        if stage == "simulate" and segments.folder.exists() and not self.experiment.workers_on(stage):
+            with self.experiment.working_on(stage):
+                segments.remove()
 
     def _renew(self, stage: str, state: State) -> None:
         """Take the file from another experiment that has it, else make it."""

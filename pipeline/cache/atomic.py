@@ -71,9 +71,14 @@ def disk_full(path: Path) -> InputError:
     )
 
 
+def stale_files(folder: Path) -> list[Path]:
+    """The temporary files of processes of this host that are no more."""
+    return [path for path in folder.glob(f"*.tmp.{socket.gethostname()}.*") if not _alive(path)]
+
+
 def remove_stale(folder: Path) -> list[Path]:
-    """Remove the temporary files of processes of this host that are no more; return their paths."""
-    stale = [path for path in folder.glob(f"*.tmp.{socket.gethostname()}.*") if not _alive(path)]
+    """Remove these files; return their paths."""
+    stale = stale_files(folder)
     for path in stale:
         path.unlink(missing_ok=True)
     return stale

@@ -93,6 +93,7 @@ def assert_same(found: cache.Experiment, wanted: cache.Experiment) -> None:
     assert [name for name in theirs if ours[name] != theirs[name]] == []
     assert len(theirs) == 3 + FRAMES
     assert leftovers(found) == []
+    assert not found.guides.with_suffix(".segments").exists()
 
 
 def leftovers(experiment: cache.Experiment) -> list[str]:
