@@ -8,9 +8,9 @@ import platform
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,12 +21,10 @@ from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.render.body import DrawnBody
 from pipeline.render.camera import CameraPath
-from pipeline.render.frame import FrameRenderer, Moment, Skin
+from pipeline.render.frame import FrameRenderer, Linear, Moment, Skin
 from pipeline.render.passes import mean, passes
 from pipeline.render.target import Target
 from pipeline.render.tone import Pixels
-
-Record = dict[str, Any]
 
 
 def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequence[int] = ()) -> None:
@@ -34,7 +32,13 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
 
     Raises InputError when there is no off-screen OpenGL or the disk is full; Missing or Damaged for caches.
     """
-    wanted = frames or range(1, config.simulate.frames + 1)
+    with open_frames(config, experiment, key) as opened:
+        opened.render(frames or range(1, config.simulate.frames + 1))
+
+
+@contextmanager
+def open_frames(config: Config, experiment: cache.Experiment, key: str) -> Iterator["Frames"]:
+    """Open what all frames of an experiment share; they can then be rendered in any portions. Raises as `execute`."""
     with cache.open(experiment.groom, "groom") as groom, cache.open(experiment.strands, "strands") as strands:
         expansion = expansion_from(groom, strands, config)
         keys = strands["strands/key"][:]
@@ -42,46 +46,108 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
         body = DrawnBody(moving, skin, strands["strands/root"][:]) if moving and skin else None
     renderer = FrameRenderer(config, expansion, keys, skin, head)
     path = CameraPath.of(config.scene.camera, head, config.simulate.frames, config.simulate.fps)
-    record = provenance(config, "render")
-    texts = {"config": config.name}
-    shape = ""
-    with (
-        cache.open_guides(experiment.guides) as guides,
-        _writer() as write,
-        track("render", len(wanted)) as bar,
-    ):
-        moments = Moments(guides, body)
-        for number in wanted:
-            shots = list(passes(config, path, number))
-            name, pixels_wide = renderer.shape(moments.at(number, 0), shots[0].view)
-            if name != shape:
-                say("render", f"strands are {name}, {pixels_wide:.2g} px wide, from frame {number} on")
-                shape = name
-            picture = renderer.developed(
-                mean(renderer.linear(moments.at(number, shot.back), shot.view) for shot in shots)
+    try:
+        with cache.open_guides(experiment.guides) as guides:
+            yield Frames(
+                config, renderer, path, Source(guides, body), Pictures(experiment.frames, config, key)
             )
-            texts |= {"geometry": name, "frame": str(number), "fingerprint": fingerprint(renderer.target)}
-            write(experiment.frames / f"{number:04d}.png", picture, key, record, dict(texts))
-            bar.advance()
-    renderer.target.close()
+    finally:
+        renderer.close()
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The frames of an experiment, by one renderer."""
+
+    config: Config
+    renderer: FrameRenderer
+    path: CameraPath
+    source: "Source"
+    pictures: "Pictures"
+
+    def render(self, numbers: Sequence[int]) -> None:
+        """Render frames (numbers from 1): while one is drawn the next is read and lit, and the last one written."""
+        shape = ""
+        with ThreadPoolExecutor(1, "write") as pool, track("render", len(numbers)) as bar:
+            moments, writing = self._moments(numbers), None
+            for number in numbers:
+                shots = list(passes(self.config, self.path, number))
+                name, wide = self.renderer.shape(moments.at(number, shots[0].back), shots[0].view)
+                if name != shape:
+                    say("render", f"strands are {name}, {wide:.2g} px wide, from frame {number} on")
+                    shape = name
+                linear = mean(
+                    self.renderer.linear(moments.at(number, shot.back), shot.view) for shot in shots
+                )
+                if writing is not None:
+                    writing.result()
+                texts = {"geometry": name, "fingerprint": fingerprint(self.renderer.target)}
+                writing = pool.submit(self._write, number, linear, texts)
+                bar.advance()
+            if writing is not None:
+                writing.result()
+
+    def _moments(self, numbers: Sequence[int]) -> "Moments":
+        order = [(number, shot.back) for number in numbers for shot in passes(self.config, self.path, number)]
+        return Moments(list(dict.fromkeys(order)), self.source, self.renderer)
+
+    def _write(self, number: int, linear: Linear, texts: dict[str, str]) -> None:
+        self.pictures.write(number, self.renderer.developed(linear), texts)
 
 
 class Moments:
-    """What is drawn of a simulation; the last one that was asked for is kept as it is."""
+    """What is drawn, one moment after another in a known order: the next is made ready beside the drawing."""
 
-    def __init__(self, guides: cache.GuidesReader, body: DrawnBody | None) -> None:
-        self._guides, self._body = guides, body
-        self._at = lru_cache(1)(self._read)
+    def __init__(self, order: Sequence[tuple[int, int]], source: "Source", renderer: FrameRenderer) -> None:
+        """Moments as (frame from 1, states before it), none of them twice."""
+        self._order, self._source, self._renderer = iter(order), source, renderer
+        self._here: tuple[int, int] | None = None
+        self._moment: Moment | None = None
+        self._coming: tuple[tuple[int, int], Future[Moment]] | None = None
+        self._fetch()
 
     def at(self, number: int, back: int) -> Moment:
-        """The moment of a frame, counted from 1, or `back` states before it."""
-        return self._at(number, back)
+        """The moment of a frame, counted from 1, or `back` states before it; the same object while it is asked again."""
+        if self._moment is None or (number, back) != self._here:
+            if self._coming is None or self._coming[0] != (number, back):
+                raise ValueError(f"frame {number}, {back} states before it, comes out of its order")
+            self._here, self._moment = (number, back), self._coming[1].result()
+            self._fetch()
+        return self._moment
 
-    def _read(self, number: int, back: int) -> Moment:
-        moment = Moment(*self._guides.state(number - 1, back))
-        if self._body is None:
+    def _fetch(self) -> None:
+        place = next(self._order, None)
+        self._coming = place and (place, self._renderer.prepare(partial(self._source.read, *place)))
+
+
+@dataclass(frozen=True)
+class Source:
+    """Moments as they are stored."""
+
+    guides: cache.GuidesReader
+    body: DrawnBody | None
+
+    def read(self, number: int, back: int) -> Moment:
+        """The moment of a frame, counted from 1, or `back` states before it."""
+        moment = Moment(*self.guides.state(number - 1, back))
+        if self.body is None:
             return moment
-        return self._body.at(max(0.0, number - 1 - back / self._guides.states), moment)
+        return self.body.at(max(0.0, number - 1 - back / self.guides.states), moment)
+
+
+class Pictures:
+    """Where frames are written."""
+
+    def __init__(self, folder: Path, config: Config, key: str) -> None:
+        self._folder, self._key = folder, key
+        self._record = provenance(config, "render")
+        self._texts = {"config": config.name}
+
+    def write(self, number: int, picture: Pixels, texts: dict[str, str]) -> None:
+        """Write a frame with its key, what it was made from and `texts`. Raises InputError when the disk is full."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        texts = self._texts | {"frame": str(number)} | texts
+        cache.write_picture(self._folder / f"{number:04d}.png", picture, self._key, self._record, **texts)
 
 
 def fingerprint(target: Target) -> str:
@@ -100,36 +166,6 @@ def _processor() -> str:
         return platform.machine()
     wanted = ("vendor_id", "cpu family", "model\t", "model name")
     return " ".join(dict.fromkeys(line.split(":", 1)[1].strip() for line in lines if line.startswith(wanted)))
-
-
-class _Write:
-    """Writes one picture at a time beside the rendering of the next."""
-
-    def __init__(self, pool: ThreadPoolExecutor) -> None:
-        self._pool = pool
-        self._last: Future[None] | None = None
-
-    def __call__(self, path: Path, picture: Pixels, key: str, record: Record, texts: dict[str, str]) -> None:
-        self.wait()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._last = self._pool.submit(_write_picture, path, picture, key, record, texts)
-
-    def wait(self) -> None:
-        """Wait for the picture that is being written; raises what went wrong with it."""
-        if self._last is not None:
-            self._last.result()
-
-
-def _write_picture(path: Path, picture: Pixels, key: str, record: Record, texts: dict[str, str]) -> None:
-    cache.write_picture(path, picture, key, record, **texts)
-
-
-@contextmanager
-def _writer() -> Iterator[_Write]:
-    with ThreadPoolExecutor(1) as pool:
-        writer = _Write(pool)
-        yield writer
-        writer.wait()
 
 
 def _skin(groom: cache.Reader) -> Skin | None:
