@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def open_frames(config: Config, experiment: cache.Experiment, key: str) -> Itera
     try:
         with cache.open_guides(experiment.guides) as guides:
             yield Frames(
-                config, renderer, path, Source(guides, body), Pictures(experiment.frames, config, key)
+                config, renderer, path, Stored(guides, body), Pictures(experiment.frames, config, key)
             )
     finally:
         renderer.close()
@@ -120,15 +121,23 @@ class Moments:
         self._coming = place and (place, self._renderer.prepare(partial(self._source.read, *place)))
 
 
+class Source(Protocol):
+    """Where moments come from."""
+
+    def read(self, number: int, back: int) -> Moment:
+        """The moment of a frame, counted from 1, or `back` states before it."""
+        ...
+
+
 @dataclass(frozen=True)
-class Source:
-    """Moments as they are stored."""
+class Stored:
+    """Moments as a simulation has stored them."""
 
     guides: cache.GuidesReader
     body: DrawnBody | None
 
     def read(self, number: int, back: int) -> Moment:
-        """The moment of a frame, counted from 1, or `back` states before it."""
+        """See `Source`."""
         moment = Moment(*self.guides.state(number - 1, back))
         if self.body is None:
             return moment
