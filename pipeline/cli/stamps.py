@@ -31,7 +31,7 @@ equals := =
 	@$(RINGLET) interpolate {config}
 
 {frames} &: {guides} {strands} {keys}/render.key
-	@$(RINGLET) render {config}
+	@$(RINGLET) render {config} $(if $(WORKERS),--workers $(WORKERS))
 
 {folder}: {frames}
 

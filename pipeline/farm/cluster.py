@@ -77,6 +77,7 @@ def connected(address: str) -> Iterator["Client"]:
     need_distributed()
     from distributed import Client
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it tells, we tell in one line
     try:
         client = Client(address, timeout=_CONNECT_S, set_as_default=False)
     except ValueError as error:
