@@ -176,7 +176,7 @@ def _make(
     before = STAGES[: STAGES.index(stage)] if everything else NEEDS[stage]
     with log.kept_in(batch.experiment.log):
         if not manner.force:
-            _refuse_what_does_not_fit(batch, (*before, stage), wanted)
+            refuse_what_does_not_fit(batch, (*before, stage), where, wanted)
         if not where.here:
             from pipeline.farm.run import make
 
@@ -186,14 +186,22 @@ def _make(
         batch.make(stage, wanted if stage == "render" else None)
 
 
-def _refuse_what_does_not_fit(batch: "Batch", stages: Sequence[str], frames: range | None) -> None:
-    """Refuse, before anything runs, when a stage that has to be made is planned to need more memory than is free."""
+def refuse_what_does_not_fit(
+    batch: "Batch", stages: Sequence[str], where: Where = HERE, frames: range | None = None
+) -> None:
+    """Refuse, before anything runs, when a stage that has to be made is planned to need more memory than is free.
+
+    Workers of this machine render side by side; what those of a scheduler have, only they know.
+    """
+    if where.scheduler:
+        return
     from pipeline.cli.machine import shortage
     from pipeline.cli.plan import estimate
 
     costs = estimate(batch.config)["stages"]
     for stage in stages:
-        short = shortage(stage, costs[stage]["peak_rss_gb"])
+        processes = (where.workers or 1) if stage == "render" else 1
+        short = shortage(stage, processes * costs[stage]["peak_rss_gb"])
         if short and not batch.state(stage, frames).fresh:
             raise InputError(f"ringlet: {short}")
 
