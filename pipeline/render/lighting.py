@@ -21,6 +21,9 @@ _F64 = NDArray[np.float64]
 
 _MARGIN: Final = 3
 """Empty voxels around the hair, so that blur and slanted rays lose nothing."""
+_FINER: Final = 4
+"""Nodes of the shadow maps along a voxel."""
+_NO_LIGHT: Final = np.zeros((0, 3), np.float32)
 _SKY_DIRECTIONS: Final = 26
 _OPAQUE: Final = 4
 """Times that the head is denser for the eye than for light: two voxels of it hide everything."""
@@ -78,25 +81,26 @@ class Lighting:
         shape = 2 * np.ceil((size / spacing + 2 * _MARGIN) / 2).astype(int)
         origin = np.asarray(lower, np.float64) - (shape * spacing - size) / 2
         nx, ny, nz = (int(extent) for extent in shape)
-        self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width, self._directions)
+        self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width, _NO_LIGHT)
+        low = np.asarray(lower, np.float64)
+        self._shadows = kernels.Shadows(self._directions, low, low + size, spacing / _FINER, width)
         self._frame = None
 
     def add(self, points: _F32, widths: _F32) -> None:
         """Add strands that cast shadows: points (S, P, 3) float32 [m], widths (S, P) float32 [m], in any chunks."""
         self._started().add(points, widths)
+        self._shadows.add(points, widths)
 
     def finish(self, head: kernels.DistanceField | None, pose: _F64) -> None:
         """Let light through what was added and the head, which stands at `pose` (4, 4), rest -> world."""
         grid = self._started()
         origin = np.array(grid.origin)
         density = grid.density()
-        towards = kernels.optical_depth(density[:-1], grid.spacing, self._directions)
-        away = kernels.optical_depth(density[:-1], grid.spacing, -self._directions)
         if head is None:
             body = np.zeros(grid.shape, np.float32)
         else:
             body = kernels.body_density(head, pose, grid.shape, origin, grid.spacing)
-        shadow = kernels.optical_depth(body[None], grid.spacing, self._directions)
+        self._shadows.finish(head, pose)
         # A fibre seen from all sides shows pi / 4 of its length * width
         hair = density[-1] * np.float32(np.pi / 4)
         sky = kernels.surroundings(
@@ -107,7 +111,7 @@ class Lighting:
             _evenly_spread(_SKY_DIRECTIONS),
         )
         light = kernels.Illumination(
-            self._directions, self._irradiance, self._sky, (towards, away, shadow), sky
+            self._directions, self._irradiance, self._sky, self._shadows, sky
         )
         light.origin, light.spacing, light.glints = grid.origin, grid.spacing, self._hair.glints
         self._frame = _Shadowed(light, head, pose, hair, body)
