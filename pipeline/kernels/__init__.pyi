@@ -681,7 +681,9 @@ class Shadows:
     Sums are integers: they depend neither on threads nor on how strands are cut into chunks.
     """
 
-    def __init__(self, directions: _F32, lower: _F64, upper: _F64, spacing: float, width: float) -> None:
+    def __init__(
+        self, directions: _F32, lower: _F64, upper: _F64, spacing: float, width: float, share: float = 1.0
+    ) -> None:
         """Empty maps.
 
         Args:
@@ -690,14 +692,26 @@ class Shadows:
             upper: (3,) float64 [m].
             spacing: [m], between the nodes of a map; the bounds are at most 2000 of it.
             width: [m], a typical drawn width.
+            share: the part of all strands that is added, as much wider, to cast the shadows of all.
 
         """
 
     def add(self, points: _F32, widths: _F32) -> None:
         """Keeps strands until `finish`: points (S, P, 3) float32 [m], widths (S, P) float32 [m]; P is always the same."""
 
-    def finish(self, field: DistanceField | None, pose: _F64) -> None:
-        """Makes the maps; the head stands at `pose` (4, 4) float64, rest -> world."""
+    def finish(
+        self, depth: _F32, origin: _F64, spacing: float, field: DistanceField | None, pose: _F64
+    ) -> None:
+        """Makes the maps.
+
+        Args:
+            depth: (L, nx, ny, nz) float32, strands towards each light on the density grid: deep in the hair less care is taken.
+            origin: (3,) float64 [m], outer corner of its first voxel.
+            spacing: [m], of its voxels.
+            field: the head in its rest frame.
+            pose: (4, 4) float64, rest -> world.
+
+        """
 
     def map(self, light: int) -> tuple[_F32, _F32, _F32]:
         """A finished map itself, not a copy, on (nu, nv) nodes.

@@ -10,11 +10,12 @@ namespace ringlet {
 using Doubles = Array<const double, 3>;
 using Directions = Array<const float, -1, 3>;
 
-static void make_shadows(Shadows *shadows, Directions directions, Doubles lower, Doubles upper, double spacing, double width) {
+static void make_shadows(Shadows *shadows, Directions directions, Doubles lower, Doubles upper, double spacing, double width, double share) {
     Bounds bounds{};
-    bounds.spacing = float(spacing), bounds.width = float(width);
+    bounds.spacing = float(spacing), bounds.width = float(width), bounds.share = float(share);
     require(spacing > 0 && std::isfinite(spacing), "Shadows: expected a positive spacing");
     require(width > 0 && std::isfinite(width), "Shadows: expected a positive width");
+    require(share > 0 && share <= 1, "Shadows: expected a share of 0 .. 1");
     for (int k = 0; k < 3; ++k) {
         bounds.lower[k] = lower.data()[k], bounds.upper[k] = upper.data()[k];
         const double size = bounds.upper[k] - bounds.lower[k];
@@ -35,10 +36,22 @@ static void add(Shadows &shadows, Array<const float, -1, -1, 3> points, Array<co
     shadows.add(points.data(), widths.data(), S, int(P));
 }
 
-static void finish(Shadows &shadows, const DistanceField *field, Array<const double, 4, 4> pose) {
+static void finish(Shadows &shadows, Array<const float, -1, -1, -1, -1> depth, Doubles origin, double spacing,
+                   const DistanceField *field, Array<const double, 4, 4> pose) {
+    require(depth.shape(0) == shadows.maps.size(), "Shadows.finish: depth does not fit the lights");
+    require(spacing > 0, "Shadows.finish: expected a positive spacing");
     const Pose to_world = Pose::of(pose.data());
+    std::vector<Depths> depths;
+    for (size_t l = 0; l < shadows.maps.size(); ++l) {
+        Depths voxels{depth.data() + l * depth.shape(1) * depth.shape(2) * depth.shape(3), {}, {}, float(1 / spacing)};
+        for (int k = 0; k < 3; ++k) {
+            voxels.n[k] = int(depth.shape(k + 1));
+            voxels.origin[k] = float(origin.data()[k] + 0.5 * spacing - shadows.maps[l].centre[k]);
+        }
+        depths.push_back(voxels);
+    }
     nb::gil_scoped_release release;
-    shadows.finish(field, to_world, threads());
+    shadows.finish(depths, field, to_world, threads());
 }
 
 static nb::ndarray<nb::numpy, float> reached(const Shadows &shadows, int light, Array<const float, -1, 3> points, float own) {
@@ -72,9 +85,10 @@ static nb::tuple map_of(nb::handle self, int light) {
 
 void bind_shadow(nb::module_ &m) {
     nb::class_<Shadows>(m, "Shadows")
-        .def("__init__", &make_shadows, nb::arg("directions"), nb::arg("lower"), nb::arg("upper"), nb::arg("spacing"), nb::arg("width"))
+        .def("__init__", &make_shadows, nb::arg("directions"), nb::arg("lower"), nb::arg("upper"), nb::arg("spacing"), nb::arg("width"),
+             nb::arg("share") = 1.0)
         .def("add", &add, nb::arg("points"), nb::arg("widths"))
-        .def("finish", &finish, nb::arg("field").none(), nb::arg("pose"))
+        .def("finish", &finish, nb::arg("depth"), nb::arg("origin"), nb::arg("spacing"), nb::arg("field").none(), nb::arg("pose"))
         .def("map", &map_of, nb::arg("light"))
         .def("reach", &reached, nb::arg("light"), nb::arg("points"), nb::arg("own") = 0.0f);
 }

@@ -123,30 +123,56 @@ struct Casters {
     size_t count() const { return P ? widths.size() / P : 0; }
 };
 
-/// Calls visit(u [nodes], v, w [m], n) for parts of a strand no longer than two thirds of a node's distance.
-template <class Visit> inline void walk(const ShadowMap &map, const float *points, const float *widths, int P, Visit &&visit) {
+/// Strands on the way to a light in voxels: not exact, but it tells what is deep in the hair.
+struct Depths {
+    static constexpr float kDeep = 16; // strands, behind which nothing is lit directly
+
+    const float *values;    // (nx, ny, nz)
+    int n[3];
+    float origin[3];        // [m] middle of the first voxel, from the maps' centre on
+    float inverse;          // voxels per metre
+
+    bool deep(const float *x) const {
+        size_t at = 0;
+        for (int k = 0; k < 3; ++k) {
+            const float v = (x[k] - origin[k]) * inverse + 0.5f;
+            if (!(v >= 0 && v < float(n[k]))) return false;
+            at = at * n[k] + size_t(v);
+        }
+        return values[at] > kDeep;
+    }
+};
+
+/// Calls visit(u [nodes], v, w [m], n) for parts of a strand: one for each node that it passes, or for a segment all of
+/// which is deep in the hair just one, as there only the sum matters.
+template <class Visit>
+inline void walk(const ShadowMap &map, const Depths &depths, const float *points, const float *widths, int P, Visit &&visit) {
     const float inverse = 1 / map.spacing;
     float before[3] = {};
+    bool was_deep = false;
     for (int j = 0; j < P; ++j) {
+        const float *x = points + 3 * j;
         float here[3];
         for (int k = 0; k < 3; ++k) {
-            const float *x = points + 3 * j, *a = map.axis[k];
+            const float *a = map.axis[k];
             here[k] = (a[0] * x[0] + a[1] * x[1] + a[2] * x[2] - map.low[k]) * (k < 2 ? inverse : 1);
         }
+        const bool deep = depths.deep(x);
         if (j > 0) {
             const float du = here[0] - before[0], dv = here[1] - before[1], dw = here[2] - before[2];
             const float length = std::sqrt(du * du + dv * dv);
             // Not-a-number and strands that broke cast no shadow
             if (length > 0 && length < 1e4f) {
-                const int steps = int(1.5f * length) + 1;
-                const float share = length * 0.5f * (widths[j - 1] + widths[j]) * inverse * map.opacity / steps;
+                const int steps = deep && was_deep ? 1 : int(length) + 1;
+                const float part = 1.0f / steps, share = length * 0.5f * (widths[j - 1] + widths[j]) * inverse * map.opacity * part;
                 for (int s = 0; s < steps; ++s) {
-                    const float t = (s + 0.5f) / steps, u = before[0] + t * du, v = before[1] + t * dv, w = before[2] + t * dw;
+                    const float t = (s + 0.5f) * part, u = before[0] + t * du, v = before[1] + t * dv, w = before[2] + t * dw;
                     if (u >= 1 && v >= 1 && u < map.n[0] - 2 && v < map.n[1] - 2 && w >= 0 && w < 10) visit(u, v, w, share);
                 }
             }
         }
         for (int k = 0; k < 3; ++k) before[k] = here[k];
+        was_deep = deep;
     }
 }
 
@@ -158,14 +184,14 @@ inline void lower_to(uint32_t &number, uint32_t value) {
 }
 
 /// The front: each node's is the nearest hair in the four cells around it, so that between nodes nothing is before it.
-inline void find_front(ShadowMap &map, const Casters &casters, int threads) {
+inline void find_front(ShadowMap &map, const Casters &casters, const Depths &depths, int threads) {
     const int nu = map.n[0], nv = map.n[1];
     uint32_t far;
     __builtin_memcpy(&far, &ShadowMap::kFar, sizeof far);
     std::vector<uint32_t> nearest(map.nodes(), far); // of each cell, as bits: positive floats are in their order
 #pragma omp parallel for schedule(dynamic, 256) num_threads(threads)
     for (size_t s = 0; s < casters.count(); ++s)
-        walk(map, casters.points.data() + 3 * s * casters.P, casters.widths.data() + s * casters.P, casters.P,
+        walk(map, depths, casters.points.data() + 3 * s * casters.P, casters.widths.data() + s * casters.P, casters.P,
              [&](float u, float v, float w, float) {
                  uint32_t bits;
                  __builtin_memcpy(&bits, &w, sizeof bits);
@@ -189,14 +215,14 @@ inline void find_front(ShadowMap &map, const Casters &casters, int threads) {
 }
 
 /// Sums of the layers.
-inline void fill_layers(ShadowMap &map, const Casters &casters, std::vector<uint32_t> &counts, int threads) {
+inline void fill_layers(ShadowMap &map, const Casters &casters, const Depths &depths, std::vector<uint32_t> &counts, int threads) {
     constexpr int K = ShadowMap::kLayers;
     const int nv = map.n[1];
     counts.assign(map.nodes() * K, 0);
     const float inverse = 1 / map.unit;
 #pragma omp parallel for schedule(dynamic, 256) num_threads(threads)
     for (size_t s = 0; s < casters.count(); ++s)
-        walk(map, casters.points.data() + 3 * s * casters.P, casters.widths.data() + s * casters.P, casters.P,
+        walk(map, depths, casters.points.data() + 3 * s * casters.P, casters.widths.data() + s * casters.P, casters.P,
              [&](float u, float v, float w, float share) {
                  const int i = int(u), j = int(v);
                  const float fu = u - i, fv = v - j, *f = map.surface.data() + 2 * (size_t(i) * nv + j);

@@ -9,6 +9,7 @@ namespace ringlet {
 struct Bounds {
     double lower[3], upper[3]; // [m]
     float spacing, width;      // [m] between nodes; a typical drawn width
+    float share;               // part of all strands that casts shadows for all of them
 };
 
 /// An empty map of the light in this direction: two unit vectors across it (Duff et al., Building an Orthonormal Basis,
@@ -33,8 +34,8 @@ inline ShadowMap empty_map(const float L[3], const Bounds &bounds) {
     map.unit = (size[2] + 2 * map.spacing) / (std::exp2((ShadowMap::kLayers - 1.0f) / ShadowMap::kOctave) - 1);
     // A strand in the middle of its own footprint, a box times a tent, covers c of what light passes there. As it never
     // lies before itself, it dims as 1 + 0.37 c strands at random would: the mean of e^-fc over its footprint, to c^2.
-    const float c = std::min(0.75f * bounds.width / map.spacing, 1.0f);
-    map.opacity = 1 + 0.37f * c;
+    const float c = 0.75f * bounds.width / map.spacing;
+    map.opacity = 1 + 0.37f * std::min(c / bounds.share, 1.0f);
     map.own = 0.5f * c * map.opacity;
     map.width = bounds.width;
     return map;
@@ -55,11 +56,12 @@ struct Shadows {
     }
 
     /// Makes the maps of all that was added and of the head.
-    void finish(const DistanceField *field, const Pose &pose, int threads) {
+    void finish(const std::vector<Depths> &depths, const DistanceField *field, const Pose &pose, int threads) {
         std::vector<uint32_t> counts;
-        for (ShadowMap &map : maps) {
-            find_front(map, casters, threads);
-            fill_layers(map, casters, counts, threads);
+        for (size_t l = 0; l < maps.size(); ++l) {
+            ShadowMap &map = maps[l];
+            find_front(map, casters, depths[l], threads);
+            fill_layers(map, casters, depths[l], counts, threads);
             find_solid(map, field, pose, threads);
         }
         casters = {};

@@ -161,7 +161,7 @@ class FrameRenderer:
     ) -> None:
         """First pass: all strands into the density grid."""
         self._chunks.move(moment.guides, moment.pose, moment.moved)
-        self.lighting.begin(lower, upper, self.width)
+        self.lighting.begin(lower, upper, self.width, self.count * self.strands.points)
         for first, points in self._chunks:
             widths = self._own_widths(points)
             self.lighting.add(points, widths)

@@ -31,7 +31,7 @@ class Room:
         """These depths for lights in these directions (L, 3)."""
         corner, n = np.ones(3), 4
         shadows = kernels.Shadows(directions.astype(np.float32), -corner, corner, 0.5, 1e-9)
-        shadows.finish(None, np.eye(4))
+        shadows.finish(np.zeros((len(directions), 1, 1, 1), np.float32), corner, 1.0, None, np.eye(4))
         for index in range(len(directions)):
             surface, layers, solid = shadows.map(index)
             # Far behind the first strand no ray to the eye shares strands with the one to the light
