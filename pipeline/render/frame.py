@@ -199,7 +199,7 @@ class FrameRenderer:
         """First pass: all strands into the density grid."""
         to.moment = None
         to.chunks.move(moment.guides, moment.pose, moment.moved)
-        to.lighting.begin(*_bounds(moment), self.width)
+        to.lighting.begin(*_bounds(moment), self.width, self.count * self.strands.points)
         for first, points in to.chunks:
             widths = self._own_widths(points)
             to.lighting.add(points, widths)
