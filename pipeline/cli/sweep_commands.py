@@ -43,6 +43,7 @@ def sweep(
     from pipeline.batch.table import write_table
     from pipeline.cache import Experiment
     from pipeline.config.sweep import load_sweep
+    from pipeline.report import write_sweep_page
 
     log.use(manner.log_format)
     swept = load_sweep(config, settings)
@@ -59,5 +60,6 @@ def sweep(
                 make(batches, where.workers, where.scheduler)
             make_all(batches)
         finally:
-            path = write_table(swept, outputs, config)
-    print(path)
+            table = write_table(swept, outputs, config)
+        page = write_sweep_page(table)
+    print(table, page, sep="\n")
