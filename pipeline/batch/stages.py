@@ -115,9 +115,10 @@ class Batch:
         What the log tells; where it does not, how long the file was being written, None for frames.
         """
         records = [r for r in log.records(self.experiment.log) if r.get("key") == self.keys[stage]]
-        spent = [record["seconds"] for record in records if record["event"] == "end"]
+        ends = [record.get("seconds") for record in records if record.get("event") == "end"]
+        spent = [seconds for seconds in ends if isinstance(seconds, int | float)]
         if spent:
-            return round(sum(spent) if stage == "render" else spent[-1], 3)
+            return round(float(sum(spent) if stage == "render" else spent[-1]), 3)
         if stage == "render":
             return None
         with cache.open(self.file(stage), _KINDS[stage]) as reader:

@@ -85,7 +85,9 @@ def write_stamps(config: Path, loaded: Loaded, experiment: Experiment) -> None:
             config=_escaped(config),
             folder=_escaped(experiment.folder),
             stamp=_escaped(_stamp(experiment, "sweep")),
-            products=_listed([*products, *(experiment.folder / f"sweep.{kind}" for kind in ("json", "csv", "html"))]),
+            products=_listed(
+                [*products, *(experiment.folder / f"sweep.{kind}" for kind in ("json", "csv", "html"))]
+            ),
         ),
     )
     _write(experiment.folder / "targets.mk", rules)

@@ -60,8 +60,6 @@ def said_of(experiment: cache.Experiment, keys: dict[str, str]) -> list[Said]:
     making: dict[tuple[Any, Any], Any] = {}
     found: dict[tuple[str, str, str], Said] = {}
     for record in log.records(experiment.log):
-        if not isinstance(record, dict):
-            continue
         run, stage, event = (record.get(name) for name in ("run", "stage", "event"))
         if not isinstance(run, str) or not isinstance(stage, str):
             continue
@@ -81,7 +79,7 @@ def peaks_of(experiment: cache.Experiment, keys: dict[str, str]) -> dict[str, fl
     """Most memory that a process used while it made a stage [GB], where the log tells."""
     peaks: dict[str, float] = {}
     for record in log.records(experiment.log):
-        if not isinstance(record, dict) or record.get("event") != "end":
+        if record.get("event") != "end":
             continue
         stage, peak = record.get("stage"), record.get("peak_gb")
         if isinstance(stage, str) and isinstance(peak, int | float) and record.get("key") == keys.get(stage):

@@ -138,7 +138,9 @@ def _plots(experiment: cache.Experiment, loaded: Loaded) -> Html:
     drawn = [
         plot(
             [Line(label, values.tolist(), label.startswith("tolerance")) for label, values in lines.items()],
-            time, "time [s]", title
+            time,
+            "time [s]",
+            title,
         )
         for title, lines in groups
         if lines
