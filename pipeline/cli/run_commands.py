@@ -162,6 +162,7 @@ def _make(
 ) -> None:
     """Make a stage and whatever it needs; `everything` also makes the stages before it that it does not need."""
     from pipeline.cli.machine import refuse_bare_start
+    from pipeline.cli.report_commands import write_report
 
     log.use(manner.log_format)
     refuse_bare_start()  # before anything large is loaded
@@ -184,6 +185,8 @@ def _make(
         for name in before:
             batch.make(name, touch=everything)
         batch.make(stage, wanted if stage == "render" else None)
+        if stage == "render" and wanted is None:
+            write_report(loaded, batch.experiment)
 
 
 def refuse_what_does_not_fit(

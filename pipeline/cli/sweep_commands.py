@@ -45,6 +45,7 @@ def sweep(
     from pipeline.cli.run_commands import refuse_what_does_not_fit
     from pipeline.config import STAGES
     from pipeline.config.sweep import load_sweep
+    from pipeline.report import write_sweep_page
 
     log.use(manner.log_format)
     swept = load_sweep(config, settings)
@@ -64,5 +65,6 @@ def sweep(
                 make(batches, where.workers, where.scheduler)
             make_all(batches)
         finally:
-            path = write_table(swept, outputs, config)
-    print(path)
+            table = write_table(swept, outputs, config)
+        page = write_sweep_page(table)
+    print(table, page, sep="\n")
