@@ -18,6 +18,7 @@ from pipeline.config.schema import PRESETS, Config
 from pipeline.config.sequence import numbered_files
 from pipeline.config.toml_lines import key_lines
 from pipeline.config.tree import KeyPath, Tree, dotted, parse_key
+from pipeline.config.usd_layers import layers_of
 from pipeline.errors import InputError
 
 FILES: dict[
@@ -88,9 +89,10 @@ def set_value(tree: Tree, path: KeyPath, value: Any, origin: str, folder: Path) 
 
 
 def named_files(config: Config) -> dict[tuple[str, ...], tuple[Path, ...]]:
-    """The files that a config names, by key. Raises InputError for a sequence with gaps."""
+    """The files that a config names, by key, and the layers that those of OpenUSD name. Raises InputError for a sequence with gaps."""
     values = config.model_dump(mode="json")
-    files = {key: (Path(value),) for key, value in _naming(values, FILES).items() if value not in _words(key)}
+    alone = {key: Path(value) for key, value in _naming(values, FILES).items() if value not in _words(key)}
+    files = {key: (path, *layers_of(path)) for key, path in alone.items()}
     sequences = {key: numbered_files(Path(value)) for key, value in _naming(values, SEQUENCES).items()}
     return files | sequences
 
