@@ -129,9 +129,7 @@ class Lighting:
             self._loss,
             _evenly_spread(_SKY_DIRECTIONS),
         )
-        light = kernels.Illumination(
-            self._directions, self._irradiance, self._sky, self._shadows, sky
-        )
+        light = kernels.Illumination(self._directions, self._irradiance, self._sky, self._shadows, sky)
         light.origin, light.spacing, light.glints = grid.origin, grid.spacing, self._hair.glints
         self._frame = _Shadowed(light, head, pose, hair, body)
         self._grid = None

@@ -59,7 +59,9 @@ def test_counts_are_those_of_exact_rays(light: int) -> None:
     exact = passed(points, x.astype(float), own, LIGHTS[light].astype(float))
     n = shadows(points, widths).reach(light, x.astype(np.float32), 1.0)[:, 0]
     seen = (exact == 0).mean(), np.exp(-n).mean()
-    print(f"light {light}: strands {n.mean():.2f}, exact {exact.mean():.2f}; lit {seen[1]:.3f}, exact {seen[0]:.3f}")
+    print(
+        f"light {light}: strands {n.mean():.2f}, exact {exact.mean():.2f}; lit {seen[1]:.3f}, exact {seen[0]:.3f}"
+    )
     assert n.mean() == pytest.approx(exact.mean(), rel=0.12)
     assert seen[1] == pytest.approx(seen[0], abs=0.02)
 
@@ -108,7 +110,9 @@ def test_the_heads_shadow_has_its_edge_where_it_should() -> None:
     x = np.stack([radii * np.cos(turn), np.full((40, 201), -0.018), radii * np.sin(turn)], -1)
     lit = maps.reach(1, x.reshape(-1, 3).astype(np.float32))[:, 2].reshape(40, 201)
     edge = radii[(lit > 0.5).argmax(1)]
-    print(f"edge at {edge.mean() * 1e3:.2f} mm, +- {np.abs(edge - edge.mean()).max() * 1e3:.2f}; the ball has 10")
+    print(
+        f"edge at {edge.mean() * 1e3:.2f} mm, +- {np.abs(edge - edge.mean()).max() * 1e3:.2f}; the ball has 10"
+    )
     assert np.abs(edge - 0.01).max() < SPACING
     assert lit[:, -1].min() == 1
     assert lit[:, 0].max() == 0

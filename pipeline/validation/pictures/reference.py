@@ -74,7 +74,9 @@ def load(folder: Path, name: str) -> Reference:
             field_of_view=np.radians(camera["vfov_deg"]),
         ),
         lights=tuple(
-            Light(direction=tuple(each["to_light"]), colour=tuple(each["color"]), irradiance=each["irradiance"])
+            Light(
+                direction=tuple(each["to_light"]), colour=tuple(each["color"]), irradiance=each["irradiance"]
+            )
             for each in scene["lights"]
         ),
         environment=tuple(scene["environment_radiance"]),
