@@ -51,9 +51,7 @@ class Target:
         return len(data)
 
 
-def fuzz(
-    target: Target, numbers: range, seed: int, folder: Path, keep: Path | None = None
-) -> dict[str, int]:
+def fuzz(target: Target, numbers: range, seed: int, folder: Path, keep: Path | None = None) -> dict[str, int]:
     """Damage and read files of these numbers; what came out. Those that broke something are kept in a folder."""
     path, outcomes = folder / f"damaged{target.ending}", Counter[str]()
     for number, outcome in zip(numbers, watched(target, path, seed, numbers), strict=True):

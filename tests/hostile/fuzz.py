@@ -32,7 +32,9 @@ def main() -> int:
     parser.add_argument("--files", type=int, default=100_000, help="for every reader")
     parser.add_argument("--from", type=int, default=0, dest="first", help="number of the first file")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=float("inf"), help="for every reader; then the next one")
+    parser.add_argument(
+        "--seconds", type=float, default=float("inf"), help="for every reader; then the next one"
+    )
     parser.add_argument("--keep", type=Path, help="folder for files that broke something")
     parser.add_argument("--only", nargs="+", default=[], help="names of readers, or how they begin")
     options = parser.parse_args()

@@ -58,7 +58,9 @@ def targets(folder: Path) -> list[Target]:
         Target("transforms-h5", ".h5", [_transforms(folder)], lambda path: read_transforms(path, 24)),
         Target("pins", ".csv", [_text(pins), _text(ends)], lambda path: read_held(path, 6, 8)),
         Target("pins-npy", ".npy", [_npy(pins), _npy(ends)], lambda path: read_held(path, 6, 8)),
-        Target("parting", ".csv", [b"u,v\n0,0.8\n0.1;0.5\n# no\n0 0.1\n"], lambda p: read_table(p, (2, 3), "two")),
+        Target(
+            "parting", ".csv", [b"u,v\n0,0.8\n0.1;0.5\n# no\n0 0.1\n"], lambda p: read_table(p, (2, 3), "two")
+        ),
         *_meshes(folder),
         *_pictures(),
         Target("cache", ".h5", _caches(folder), _cache),
