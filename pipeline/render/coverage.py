@@ -17,7 +17,7 @@ Points = NDArray[np.float32]
 Chunk = tuple[Points, Points, Points, NDArray[np.uint32]]
 """Points (S, P, 3) [m], widths (S, P) [m], absorption (S, 3), random keys (S,)."""
 
-_LAYERS = 40.0  # of hair that hide the rest: with fewer, more pixels are drawn twice; with more, more is sorted for nothing
+_LAYERS = 33.0  # of hair that hide the rest: with fewer, more pixels are drawn twice; with more, more is sorted for nothing
 
 
 class Coverage:
