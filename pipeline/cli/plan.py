@@ -40,7 +40,7 @@ _RENDER_B_PER_SAMPLE = 60
 _RENDER_B_PER_SEGMENT = 14  # of strands that may be seen, sorted into tiles
 _BOUND_B = 70  # of a strand's binding in memory, and its order
 _IN_FLIGHT = 65_536  # strands: the renderer's chunk
-_KEPT_B = 100 << 20  # points that the renderer keeps between its two passes
+_KEPT_B = 256 << 20  # points that the renderer keeps between its two passes
 _PNG_B_PER_PIXEL = 0.5
 
 
@@ -115,7 +115,7 @@ def _render(config: Config) -> Cost:
     if camera.shutter or camera.f_stop is not None:
         frame *= render.passes
     all_points = 12 * strands * config.groom.points
-    kept = all_points if all_points <= _KEPT_B else 0
+    kept = min(all_points, _KEPT_B)
     in_flight = points * min(1.0, _IN_FLIGHT / strands)
     shapes = 12 * min(config.groom.strands, _strands(config)) * config.groom.points + _BOUND_B * _strands(
         config

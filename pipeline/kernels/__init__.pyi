@@ -742,6 +742,15 @@ def shade(
 
     """
 
+class PointShader:
+    """Gives points of strands their colours, whenever it is asked."""
+
+class FibreShader(PointShader):
+    """Shades points of strands as `shade` does."""
+
+    def __init__(self, light: Illumination, tables: FibreTables, eye: _F64) -> None:
+        """Light, scattering of one fibre, and the eye (3,) float64 [m] that looks; light and tables are held."""
+
 class Surface:
     """Points of the head's surface."""
 
@@ -809,22 +818,29 @@ class Backdrop:
         """
 
 class Raster:
-    """Strands of a picture by exact coverage: `count` some or all, `cut_off`, then `add` and `colour` all, `compose`.
+    """Strands of a picture by exact coverage: `begin`, `count` some or all, `cut_off`, `add` all, `compose`.
 
     Strands come in chunks of any size, in the same order each time. No result depends on chunks or threads.
     """
 
-    def __init__(
-        self, size: tuple[int, int], matrix: _F64, scale: float, planes: tuple[float, float], layers: float
-    ) -> None:
-        """Start a picture.
+    def __init__(self, size: tuple[int, int], layers: float) -> None:
+        """Prepare for pictures of one size; memory is kept from one to the next.
 
         Args:
             size: width and height [px].
+            layers: of hair behind which nothing is expected to be seen; a guess that costs time, never the picture.
+
+        """
+
+    shaded: int  # points of the picture; a few of them count twice, where threads meet
+
+    def begin(self, matrix: _F64, scale: float, planes: tuple[float, float]) -> None:
+        """Start a picture.
+
+        Args:
             matrix: (4, 4) float64, world [m] to clip space, as OpenGL has it.
             scale: half width [px] that a unit radius has at unit distance.
             planes: distances [m] of the near and the far plane.
-            layers: of hair behind which nothing is expected to be seen; a guess that costs time, never the picture.
 
         """
 
@@ -834,17 +850,18 @@ class Raster:
     def cut_off(self, backdrop: Backdrop) -> None:
         """End counting: hair behind enough hair, or behind the backdrop, is not looked at."""
 
-    def add(self, points: _F32, widths: _F32) -> NDArray[np.uint32]:
-        """Add strands (S, P, 3) with widths (S, P); returns which of their S * P points are seen, (n,), ascending."""
+    def add(self, points: _F32, widths: _F32, absorption: _F32, key: NDArray[np.uint32]) -> None:
+        """Add strands (S, P, 3) [m] with widths (S, P) [m], absorption (S, 3) and random keys (S,).
 
-    def colour(self, colours: _F32) -> None:
-        """Give the points that the last `add` returned their linear RGB (n, 3)."""
+        What may be seen of them is copied.
+        """
 
-    def compose(self, backdrop: Backdrop, picture: _F32) -> int:
+    def compose(self, backdrop: Backdrop, shader: PointShader, picture: _F32) -> int:
         """Draw what was added over the backdrop into a picture (H, W, 3), linear RGB.
 
-        Returns how many tiles lack hair that was cut off too early. If there are any, `add` and `colour` all strands
-        once more and compose again: only the pixels that lack hair are drawn, with nothing cut off.
+        Points are shaded when a segment of theirs comes to a pixel that is not full. Returns how many tiles lack hair
+        that was cut off too early. If there are any, `add` all strands once more and compose again: only the pixels
+        that lack hair are drawn, with nothing cut off.
         """
 
 # --- groom: random numbers, equal spacing, growth, curls, clumps (random, smooth_curve, grow, coil, polylines .hpp) -------

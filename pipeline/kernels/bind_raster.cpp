@@ -27,15 +27,18 @@ static void make_backdrop(HeldBackdrop *held, Widths depth, Array<const uint8_t,
     new (held) HeldBackdrop{{depth.data(), samples.data(), decode.data(), per_side}, depth, samples, decode};
 }
 
-static void make_raster(Raster *raster, std::array<int, 2> size, Array<const double, 4, 4> matrix, double scale,
-                        std::array<double, 2> planes, float layers) {
+static void make_raster(Raster *raster, std::array<int, 2> size, float layers) {
     require(size[0] >= 1 && size[1] >= 1 && size[0] <= 1 << 15 && size[1] <= 1 << 15, "Raster: expected a size of 1 to 32768");
-    require(planes[0] > 0 && planes[1] > planes[0] && std::isfinite(planes[1]), "Raster: expected 0 < near < far");
-    require(scale > 0 && std::isfinite(scale), "Raster: expected a positive scale");
     require(layers > 0, "Raster: expected a positive number of layers");
-    View view{{}, size[0], size[1], float(scale), float(planes[0]), float(planes[1])};
+    new (raster) Raster(size[0], size[1], layers);
+}
+
+static void begin(Raster &raster, Array<const double, 4, 4> matrix, double scale, std::array<double, 2> planes) {
+    require(planes[0] > 0 && planes[1] > planes[0] && std::isfinite(planes[1]), "Raster.begin: expected 0 < near < far");
+    require(scale > 0 && std::isfinite(scale), "Raster.begin: expected a positive scale");
+    View view{{}, raster.view.W, raster.view.H, float(scale), float(planes[0]), float(planes[1])};
     for (int i = 0; i < 16; ++i) view.M[i / 4][i % 4] = float(matrix.data()[i]);
-    new (raster) Raster{view, layers, {}, {}, {}};
+    raster.begin(view);
 }
 
 static void fits(const Raster &raster, const HeldBackdrop &back) {
@@ -51,58 +54,48 @@ static void fits(Points points, Widths widths) {
 
 static void count(Raster &raster, Points points, Widths widths, size_t first) {
     fits(points, widths);
+    require(raster.view.scale > 0, "Raster.count: before begin");
     nb::gil_scoped_release release;
     raster.counted.add(raster.view, points.data(), widths.data(), int(points.shape(0)), int(points.shape(1)), first, std::min(threads(), 8));
 }
 
 static void cut_off(Raster &raster, const HeldBackdrop &back) {
     fits(raster, back);
+    require(raster.view.scale > 0, "Raster.cut_off: before begin");
     nb::gil_scoped_release release;
     raster.cut_off(back, threads());
 }
 
-static nb::ndarray<nb::numpy, uint32_t> add(Raster &raster, Points points, Widths widths) {
+static void add(Raster &raster, Points points, Widths widths, Array<const float, -1, 3> absorption, Array<const uint32_t, -1> key) {
     fits(points, widths);
+    const size_t S = points.shape(0), P = points.shape(1);
+    require(absorption.shape(0) == S && key.shape(0) == S, "Raster.add: absorption and key do not fit points");
     require(!raster.bins.cut.empty(), "Raster.add: before cut_off");
-    require(raster.bins.waiting == raster.bins.batches.size(), "Raster.add: the last chunk has no colours");
-    const size_t S = points.shape(0), step = Bins::strands_per_batch(int(points.shape(1)));
-    require(raster.bins.batches.size() + S / step < 1u << (32 - Batch::kBits), "Raster.add: too many strands");
-    {
-        nb::gil_scoped_release release;
-        raster.bins.add(raster.view, points.data(), widths.data(), int(S), int(points.shape(1)), threads());
-    }
-    auto seen = new_array<uint32_t>({raster.bins.seen()});
-    uint32_t *to = seen.data();
-    for (size_t b = raster.bins.waiting; b < raster.bins.batches.size(); ++b)
-        to = std::copy(raster.bins.batches[b].seen.begin(), raster.bins.batches[b].seen.end(), to);
-    return seen;
-}
-
-static void colour(Raster &raster, Array<const float, -1, 3> colours) {
-    require(colours.shape(0) == raster.bins.seen(), "Raster.colour: expected a colour for each point that is seen");
+    require(raster.bins.batches.empty() || raster.bins.P == int(P), "Raster.add: another number of points than before");
+    require(raster.bins.batches.size() + S / Bins::strands_per_batch(int(P)) < 1u << (32 - Batch::kBits), "Raster.add: too many strands");
     nb::gil_scoped_release release;
-    raster.bins.colour(colours.data(), threads());
+    raster.bins.add(raster.view, {points.data(), widths.data(), absorption.data(), key.data(), int(S), int(P)}, threads());
 }
 
-static int compose(Raster &raster, const HeldBackdrop &back, Picture picture) {
+static int compose(Raster &raster, const HeldBackdrop &back, const PointShader &shader, Picture picture) {
     fits(raster, back);
     require(!raster.bins.cut.empty(), "Raster.compose: before cut_off");
-    require(raster.bins.waiting == raster.bins.batches.size(), "Raster.compose: the last chunk has no colours");
     require(picture.shape(0) == size_t(raster.view.H) && picture.shape(1) == size_t(raster.view.W), "Raster.compose: the picture has another size");
     nb::gil_scoped_release release;
-    return raster.compose(back, picture.data(), threads());
+    return raster.compose(back, shader, picture.data(), threads());
 }
 
 void bind_raster(nb::module_ &m) {
     nb::class_<HeldBackdrop>(m, "Backdrop")
         .def("__init__", &make_backdrop, nb::arg("depth"), nb::arg("samples"), nb::arg("decode"), nb::arg("per_side"));
     nb::class_<Raster>(m, "Raster")
-        .def("__init__", &make_raster, nb::arg("size"), nb::arg("matrix"), nb::arg("scale"), nb::arg("planes"), nb::arg("layers"))
+        .def("__init__", &make_raster, nb::arg("size"), nb::arg("layers"))
+        .def("begin", &begin, nb::arg("matrix"), nb::arg("scale"), nb::arg("planes"))
         .def("count", &count, nb::arg("points"), nb::arg("widths"), nb::arg("first"))
         .def("cut_off", &cut_off, nb::arg("backdrop"))
-        .def("add", &add, nb::arg("points"), nb::arg("widths"))
-        .def("colour", &colour, nb::arg("colours"))
-        .def("compose", &compose, nb::arg("backdrop"), nb::arg("picture"));
+        .def("add", &add, nb::arg("points"), nb::arg("widths"), nb::arg("absorption"), nb::arg("key"))
+        .def("compose", &compose, nb::arg("backdrop"), nb::arg("shader"), nb::arg("picture"))
+        .def_ro("shaded", &Raster::shaded);
 }
 
 } // namespace ringlet

@@ -85,11 +85,10 @@ static Radiance shade_strands(Strands points, Triples absorption, Array<const ui
     const size_t count = which ? which->shape(0) : S * P;
     for (size_t i = 0; which && i < count; ++i) require(which->data()[i] < S * P, "shade: which has a point beyond the last one");
     auto radiance = new_array<float>({count, size_t(3)});
-    const double *e = eye.data();
-    const StrandPoints strands{points.data(), absorption.data(), key.data(), which ? which->data() : nullptr, int(P), {e[0], e[1], e[2]}};
+    const StrandPoints strands{points.data(), absorption.data(), key.data(), which ? which->data() : nullptr, int(P)};
     float *out = radiance.data();
     nb::gil_scoped_release release;
-    shade(strands, count, light, tables, out, threads());
+    FibreShader(light, tables, eye.data()).shade(strands, count, out, threads());
     return radiance;
 }
 
@@ -132,6 +131,12 @@ void bind_shade(nb::module_ &m) {
         .def_rw("glints", &HeldLight::glints);
     nb::class_<HeldSurface>(m, "Surface")
         .def("__init__", &make_surface, nb::arg("points"), nb::arg("normals"), nb::arg("albedo"), nb::arg("curvature"));
+    nb::class_<PointShader>(m, "PointShader");
+    nb::class_<FibreShader, PointShader>(m, "FibreShader")
+        .def("__init__", [](FibreShader *self, const HeldLight &light, const HeldTables &tables, Point eye) {
+                 new (self) FibreShader(light, tables, eye.data());
+             },
+             nb::arg("light"), nb::arg("tables"), nb::arg("eye"), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
     m.def("shade", &shade_strands, nb::arg("points"), nb::arg("absorption"), nb::arg("key"), nb::arg("eye"),
           nb::arg("light"), nb::arg("tables"),
           nb::arg("which") = nb::none());

@@ -1,35 +1,61 @@
-// Which segments may be seen, sorted into the tiles that they touch.
+// Which segments may be seen, and in which blocks of tiles.
 //
 // A segment is left out where it lies behind the cut-off depth of every tile that it touches. What is kept has a
-// number that grows with the strand's, so that neither threads nor chunks change any order.
+// number that grows with the strand's, so that neither threads nor chunks change any order. Strands of which something
+// is kept stay in memory, for their points are shaded once it is known which of them are seen.
 #pragma once
 
-#include "screen.hpp"
+#include "arena.hpp"
+#include "blocks.hpp"
 
-#include <array>
 #include <cstring>
 
 namespace ringlet {
 
-/// A segment in a tile; sorted by depth, then by the order of strands.
+/// A chunk of strands: points (S, P, 3) [m], widths (S, P) [m], and what shading needs of each strand.
+struct StrandChunk {
+    const float *points, *widths;
+    const float *absorption; // (S, 3)
+    const uint32_t *key;     // (S,)
+    int S, P;
+};
+
+/// A segment in a block.
 struct Entry {
-    uint32_t tile, depth, segment; // depth: the bits of a positive float, which sort as it does
+    uint32_t block, segment;
 };
 
-/// What a segment's colours are made of, until they are known: two points, and where between them it begins and ends.
-struct Uncoloured {
-    uint32_t point[2]; // numbers among the points that are seen
-    float t[2];
+/// A point of a segment that may be seen.
+struct SeenPoint {
+    static constexpr uint32_t kKnown = 1u << 31;
+
+    ScreenPoint at;
+    float colour[3]; // linear RGB, once it is known
+    uint32_t number; // of the point among those of the batch's strands, and whether its colour is known
 };
 
-/// Strands that are looked at together.
+/// Strands that are looked at together. Segment k runs from point k to point k + 1 of those that are seen.
 struct Batch {
     static constexpr int kBits = 16;
 
-    std::vector<Segment> segments;
+    Span<SeenPoint> seen;
+    Span<Entry> entries;
+    Span<float> points, absorption; // (n, P, 3) and (n, 3) of the n strands of which something is seen
+    Span<uint32_t> key;             // (n,)
+};
+
+/// A batch while it grows.
+struct OpenBatch {
+    std::vector<SeenPoint> seen;
     std::vector<Entry> entries;
-    std::vector<Uncoloured> uncoloured;
-    std::vector<uint32_t> seen; // points of the chunk, ascending
+    std::vector<float> points, absorption;
+    std::vector<uint32_t> key;
+
+    void clear() { seen.clear(), entries.clear(), points.clear(), absorption.clear(), key.clear(); }
+
+    Batch store(Arena &arena) const {
+        return {arena.copy(seen), arena.copy(entries), arena.copy(points), arena.copy(absorption), arena.copy(key)};
+    }
 };
 
 /// Cut-off depths, and the segments in front of them.
@@ -37,74 +63,48 @@ struct Bins {
     std::vector<float> cut; // (tiles,); negative: nothing is wanted here
     std::vector<TilePixels> wanted; // (tiles,) or empty: pixels that segments must touch
     std::vector<Batch> batches;
-    size_t waiting = 0; // first batch without colours
+    Arena arena; // where the batches lie
+    int P = 0;
 
-    static int strands_per_batch(int P) { return std::max(1, std::min(1024, ((1 << Batch::kBits) - 1) / (P - 1))); }
+    // Each point may be there twice, where the near plane or another segment's absence parts the strand
+    static int strands_per_batch(int P) { return std::max(1, std::min(1024, (1 << Batch::kBits) / (2 * P))); }
 
-    const Segment &segment(uint32_t number) const {
-        return batches[number >> Batch::kBits].segments[number & ((1u << Batch::kBits) - 1)];
-    }
+    const Batch &batch(uint32_t number) const { return batches[number >> Batch::kBits]; }
+    SeenPoint *seen(uint32_t number) const { return batch(number).seen.data + (number & ((1u << Batch::kBits) - 1)); }
 
-    /// Looks at strands (S, P); their segments wait for colours.
-    void add(const View &view, const float *points, const float *widths, int S, int P, int threads) {
-        const int step = strands_per_batch(P), count = (S + step - 1) / step;
+    void clear() { batches.clear(), arena.clear(); }
+
+    /// Looks at a chunk of strands.
+    void add(const View &view, const StrandChunk &strands, int threads) {
+        P = strands.P;
+        const int step = strands_per_batch(P), count = (strands.S + step - 1) / step;
         const size_t first = batches.size();
         const std::vector<float> around = widest(view);
         batches.resize(first + count);
 #pragma omp parallel num_threads(threads)
         {
-            Sieve sieve{view, cut, around, wanted, ScreenStrand(P), std::vector<int>(P), std::vector<int>(P)};
+            Sieve sieve{view, cut, around, wanted, strands, ScreenStrand(P), {}, {}, {}};
 #pragma omp for schedule(dynamic, 1)
             for (int b = 0; b < count; ++b) {
-                Batch &batch = batches[first + b];
                 const uint32_t name = uint32_t(first + b) << Batch::kBits;
-                for (int s = b * step; s < std::min(S, (b + 1) * step); ++s)
-                    sieve.strand(points, widths, size_t(s) * P, P, name, batch);
-                batch.segments.shrink_to_fit();
-                batch.entries.shrink_to_fit();
+                sieve.batch.clear();
+                for (int s = b * step; s < std::min(strands.S, (b + 1) * step); ++s) sieve.strand(s, name);
+                batches[first + b] = sieve.batch.store(arena);
             }
         }
-        waiting = first;
-    }
-
-    /// How many points are seen in the chunk that was added last.
-    size_t seen() const {
-        size_t count = 0;
-        for (size_t b = waiting; b < batches.size(); ++b) count += batches[b].seen.size();
-        return count;
-    }
-
-    /// Gives the chunk that was added last its colours, linear RGB (points that are seen, 3).
-    void colour(const float *colours, int threads) {
-        std::vector<size_t> begin{0};
-        for (size_t b = waiting; b < batches.size(); ++b) begin.push_back(begin.back() + batches[b].seen.size());
-        const ptrdiff_t count = ptrdiff_t(batches.size() - waiting);
-#pragma omp parallel for schedule(dynamic, 4) num_threads(threads)
-        for (ptrdiff_t b = 0; b < count; ++b) {
-            Batch &batch = batches[waiting + b];
-            for (size_t i = 0; i < batch.segments.size(); ++i) {
-                const Uncoloured &from = batch.uncoloured[i];
-                const float *a = colours + 3 * (begin[b] + from.point[0]), *e = colours + 3 * (begin[b] + from.point[1]);
-                for (int end = 0; end < 2; ++end)
-                    for (int c = 0; c < 3; ++c) batch.segments[i].colour[end][c] = a[c] + from.t[end] * (e[c] - a[c]);
-            }
-            batch.uncoloured = {};
-            batch.seen = {};
-        }
-        waiting = batches.size();
     }
 
   private:
-    /// The largest cut-off of each tile and its eight neighbours.
+    /// The largest cut-off of each tile and its eight neighbours, row by row.
     std::vector<float> widest(const View &view) const {
-        const int across = view.across(), down = view.down();
+        const int across = view.across() * kSide, down = view.down() * kSide;
         std::vector<float> around(cut.size());
         for (int y = 0; y < down; ++y)
             for (int x = 0; x < across; ++x) {
                 float most = -1;
                 for (int b = std::max(0, y - 1); b <= std::min(down - 1, y + 1); ++b)
                     for (int a = std::max(0, x - 1); a <= std::min(across - 1, x + 1); ++a)
-                        most = std::max(most, cut[size_t(b) * across + a]);
+                        most = std::max(most, cut[view.tile(a, b)]);
                 around[size_t(y) * across + x] = most;
             }
         return around;
@@ -114,87 +114,101 @@ struct Bins {
         const View &view;
         const std::vector<float> &cut, &around;
         const std::vector<TilePixels> &wanted;
+        const StrandChunk &strands;
         ScreenStrand at;
-        std::vector<int> passed, number;
+        TileMiddles middle;
+        TileSteps step;
+        OpenBatch batch;
 
-        /// Keeps the segments that may be seen of the strand whose first point has the number `first` in the chunk.
-        void strand(const float *points, const float *widths, size_t first, int P, uint32_t name, Batch &batch) {
-            const bool whole = at.project(view, points + 3 * first, widths + first, P);
-            if (!quick(P, whole)) return;
-            std::fill(number.begin(), number.end(), -1);
-            for (int j = 0; j + 1 < P; ++j)
-                if (passed[j]) keep(widths + first, j, first, whole, name, batch);
+        /// Keeps the segments that may be seen of a strand.
+        void strand(int s, uint32_t name) {
+            const int P = strands.P;
+            const float *points = strands.points + size_t(s) * 3 * P, *widths = strands.widths + size_t(s) * P;
+            const bool whole = at.project(view, points, widths, P);
+            const uint32_t first = uint32_t(batch.key.size()) * uint32_t(P);
+            int last = -2; // segment that was kept last
+            for (int begin = 0; begin + 1 < P; begin += kLanes<float>) {
+                // Where the strand passes the near plane nothing can be said of its points
+                uint32_t passed = whole ? quick(begin) : (1u << std::min(P - 1 - begin, kLanes<float>)) - 1;
+                for (; passed; passed &= passed - 1) keep(begin + __builtin_ctz(passed), widths, whole, name, first, last);
+            }
+            if (last < 0) return;
+            batch.points.insert(batch.points.end(), points, points + 3 * P);
+            batch.absorption.insert(batch.absorption.end(), strands.absorption + 3 * size_t(s), strands.absorption + 3 * size_t(s) + 3);
+            batch.key.push_back(strands.key[s]);
         }
 
-        /// Marks the segments that the tiles of their ends do not rule out; whether there are any.
-        bool quick(int P, bool whole) {
-            if (!whole) {
-                std::fill(passed.begin(), passed.end(), 1);
-                return true;
-            }
+        /// Keeps segment j if it may be seen.
+        void keep(int j, const float *widths, bool whole, uint32_t name, uint32_t first, int &last) {
+            ScreenPoint ends[2] = {{at.x[j], at.y[j], at.d[j], at.h[j]}, {at.x[j + 1], at.y[j + 1], at.d[j + 1], at.h[j + 1]}};
+            if (!whole && !clipped(view, at, widths, j, ends)) return;
+            const bool goes_on = whole && last == j - 1; // then the last point is there already
+            const uint32_t segment = uint32_t(batch.seen.size()) - (goes_on ? 1 : 0);
+            if (!visible(Segment(ends[0], ends[1]), name | segment)) return;
+            // A point that the near plane has moved keeps its colour
+            for (int end = goes_on ? 1 : 0; end < 2; ++end) batch.seen.push_back({ends[end], {}, first + j + end});
+            last = j;
+        }
+
+        /// The segments from the j-th on that the tiles of their ends do not rule out, a bit for each of up to 16.
+        RINGLET_INLINE uint32_t quick(int j) const {
             constexpr float margin = 2, per_tile = 1.0f / kTile;
-            const float W = view.W, H = view.H;
-            const int across = view.across();
-            const float columns = across - 1, rows = view.down() - 1;
-            const float *__restrict x = at.x.data(), *__restrict y = at.y.data(), *__restrict d = at.d.data();
-            const float *__restrict h = at.h.data(), *__restrict deep = around.data();
-            int *__restrict pass = passed.data(), some = 0;
-#pragma omp simd reduction(| : some)
-            for (int j = 0; j < P - 1; ++j) {
-                const float wide = margin + std::max(h[j], h[j + 1]);
-                const int inside = (std::max(x[j], x[j + 1]) > -wide) & (std::min(x[j], x[j + 1]) < W + wide) &
-                                    (std::max(y[j], y[j + 1]) > -wide) & (std::min(y[j], y[j + 1]) < H + wide);
-                const int a0 = int(std::min(std::max(x[j] * per_tile, 0.0f), columns));
-                const int a1 = int(std::min(std::max(x[j + 1] * per_tile, 0.0f), columns));
-                const int b0 = int(std::min(std::max(y[j] * per_tile, 0.0f), rows));
-                const int b1 = int(std::min(std::max(y[j + 1] * per_tile, 0.0f), rows));
-                const float deepest = std::max(deep[b0 * across + a0], deep[b1 * across + a1]);
-                const int far = (a0 - a1 > 2) | (a1 - a0 > 2) | (b0 - b1 > 2) | (b1 - b0 > 2) | (wide > kTile);
-                pass[j] = inside & (far | (std::min(d[j], d[j + 1]) <= deepest));
-                some |= pass[j];
-            }
-            return some != 0;
+            const int across = view.across() * kSide;
+            const Floats x0 = read(at.x, j), y0 = read(at.y, j), d0 = read(at.d, j), h0 = read(at.h, j);
+            const Floats x1 = read(at.x, j + 1), y1 = read(at.y, j + 1), d1 = read(at.d, j + 1), h1 = read(at.h, j + 1);
+            const Floats wide = margin + maximum<float>(h0, h1);
+            const Mask<float> inside = (maximum<float>(x0, x1) > -wide) & (minimum<float>(x0, x1) < float(view.W) + wide) &
+                                       (maximum<float>(y0, y1) > -wide) & (minimum<float>(y0, y1) < float(view.H) + wide);
+            const float columns = float(across - 1), rows = float(view.down() * kSide - 1);
+            const Mask<float> a0 = place(x0 * per_tile, columns), a1 = place(x1 * per_tile, columns);
+            const Mask<float> b0 = place(y0 * per_tile, rows), b1 = place(y1 * per_tile, rows);
+            const Floats deepest = maximum<float>(around_at(b0 * across + a0), around_at(b1 * across + a1));
+            const Mask<float> far = (a0 - a1 > 2) | (a1 - a0 > 2) | (b0 - b1 > 2) | (b1 - b0 > 2) | (wide > float(kTile));
+            const uint32_t passed = set_lanes<float>(inside & (far | (minimum<float>(d0, d1) <= deepest)));
+            return passed & ((1u << std::min(strands.P - 1 - j, 16)) - 1);
         }
 
-        void keep(const float *widths, int j, size_t first, bool whole, uint32_t name, Batch &batch) {
-            Segment s;
-            float t[2] = {0, 1};
-            if (whole) {
-                for (int end = 0; end < 2; ++end)
-                    s.x[end] = at.x[j + end], s.y[end] = at.y[j + end], s.d[end] = at.d[j + end], s.h[end] = at.h[j + end];
-            } else if (!clipped(view, at, widths, j, s, t)) {
-                return;
-            }
-            if (!drawable(s)) return;
-            const float dx = s.x[1] - s.x[0], dy = s.y[1] - s.y[0], dd = s.d[1] - s.d[0];
-            const float square = dx * dx + dy * dy + 1e-12f, inverse = 1 / square;
-            const float nearest = std::min(s.d[0], s.d[1]), spread = std::abs(dd) * 0.75f * kTile / std::sqrt(square);
-            const uint32_t segment = name | uint32_t(batch.segments.size());
-            bool kept = false;
-            const float half = std::max(s.h[0], s.h[1]);
-            visit_tiles(view, s, kReach + half, [&](int column, int row) {
-                const int tile = row * view.across() + column;
-                const float mx = (column + 0.5f) * kTile - s.x[0], my = (row + 0.5f) * kTile - s.y[0];
-                const float u = std::min(std::max((mx * dx + my * dy) * inverse, 0.0f), 1.0f), d = s.d[0] + dd * u;
-                if (std::max(nearest, d - spread) > cut[tile]) return;
-                if (!wanted.empty() && !wanted[tile].touched(s, kReach + half, float(column * kTile), float(row * kTile))) return;
-                Entry entry{uint32_t(tile), 0, segment};
-                std::memcpy(&entry.depth, &d, sizeof d);
-                batch.entries.push_back(entry);
-                kept = true;
+        static RINGLET_INLINE Floats read(const std::vector<float> &from, int j) {
+            Floats lanes;
+            std::memcpy(&lanes, from.data() + j, sizeof lanes);
+            return lanes;
+        }
+
+        static RINGLET_INLINE Mask<float> place(Floats x, float last) {
+            return __builtin_convertvector(minimum<float>(maximum<float>(x, splat(0.0f)), splat(last)), Mask<float>);
+        }
+
+        RINGLET_INLINE Floats around_at(Mask<float> tile) const {
+            Floats depth;
+            for (int k = 0; k < kLanes<float>; ++k) depth[k] = around[tile[k]];
+            return depth;
+        }
+
+        /// Enters a segment into the blocks where it may be seen; whether there are any.
+        bool visible(const Segment &s, uint32_t number) {
+            if (!s.drawable()) return false;
+            bool some = false;
+            visit_blocks(view, s, [&](int block, float left, float top) {
+                if (!seen_in(s, block, left, top)) return;
+                batch.entries.push_back({uint32_t(block), number});
+                some = true;
             });
-            if (!kept) return;
-            batch.segments.push_back(s);
-            batch.uncoloured.push_back({{see(j, first, batch), see(j + 1, first, batch)}, {t[0], t[1]}});
+            return some;
         }
 
-        /// Number of point j of the strand among those of the batch that are seen.
-        uint32_t see(int j, size_t first, Batch &batch) {
-            if (number[j] < 0) {
-                number[j] = int(batch.seen.size());
-                batch.seen.push_back(uint32_t(first + j));
+        bool seen_in(const Segment &s, int block, float left, float top) const {
+            constexpr int count = kSide * kSide;
+            const Touch touch(s, middle, left, top);
+            TileLanes before;
+            std::memcpy(&before, &cut[size_t(block) * count], sizeof before);
+            const uint32_t tiles = set_lanes<float>(touch.tiles & (touch.nearest <= before));
+            if (wanted.empty()) return tiles != 0;
+            for (uint32_t bits = tiles; bits; bits &= bits - 1) {
+                const int k = __builtin_ctz(bits);
+                const Words pixels = crossed(s, left + float(k % kSide * kTile), top + float(k / kSide * kTile), wanted[block * count + k], step);
+                if (any<float>((Mask<float>)pixels != 0)) return true;
             }
-            return uint32_t(number[j]);
+            return false;
         }
     };
 };

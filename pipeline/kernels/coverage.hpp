@@ -38,23 +38,27 @@ RINGLET_INLINE float sum_cells(Cells a) {
 }
 
 /// A segment where it crosses a pixel.
-struct Fragment {
-    float depth;
-    float along, across; // of the pixel's centre [px]
-    float length, half;  // of the segment [px]
-    float nx, ny;        // unit normal on the screen
-    float colour[3];
+struct Crossing {
+    float along, across; // of the pixel's centre [px], from the segment's beginning
+    float t;             // part of the segment that lies before it
+
+    RINGLET_INLINE Crossing(const Segment &s, float x, float y) {
+        const float fx = x - s.x, fy = y - s.y;
+        along = fx * s.ux + fy * s.uy, across = fy * s.ux - fx * s.uy;
+        t = std::min(std::max(along * s.inverse, 0.0f), 1.0f);
+    }
 };
 
 /// Covered part of each cell.
-RINGLET_INLINE Cells covered(const Fragment &f, const CellCentres &cell) {
+RINGLET_INLINE Cells covered(const Segment &s, const Crossing &at, const CellCentres &cell) {
     constexpr float inverse = kCells, half_cell = 0.5f / kCells, near_end = 0.75f;
-    const Cells v = f.across + f.nx * cell.x + f.ny * cell.y;
+    const float half = s.h + at.t * s.dh;
+    const Cells v = at.across + s.ux * cell.y - s.uy * cell.x;
     const Cells apart = v < 0 ? -v : v;
-    Cells part = clamp_cells((f.half + half_cell - apart) * inverse, 0, std::min(1.0f, 2 * inverse * f.half));
-    if (f.along < near_end || f.along > f.length - near_end) {
-        const Cells u = f.along + f.ny * cell.x - f.nx * cell.y;
-        part *= clamp_cells((f.length - u) * inverse + 0.5f, 0, 1) - clamp_cells(u * -inverse + 0.5f, 0, 1);
+    Cells part = clamp_cells((half + half_cell - apart) * inverse, 0, std::min(1.0f, 2 * inverse * half));
+    if (at.along < near_end || at.along > s.length - near_end) {
+        const Cells u = at.along + s.ux * cell.x + s.uy * cell.y;
+        part *= clamp_cells((s.length - u) * inverse + 0.5f, 0, 1) - clamp_cells(u * -inverse + 0.5f, 0, 1);
     }
     return part;
 }

@@ -66,7 +66,7 @@ struct Layers {
             if (!(x >= 0 && y >= 0 && x < view.W && y < view.H)) continue;
             const float distance = s.cw[j] + (s.cw[j + 1] - s.cw[j]) * t;
             const int depth = int(std::min((distance - view.near) * steps, kDepths - 1.0f));
-            counts[(size_t(int(y) / kTile) * view.across() + int(x) / kTile) * kDepths + depth] += share;
+            counts[size_t(view.tile(int(x) / kTile, int(y) / kTile)) * kDepths + depth] += share;
         }
     }
 };

@@ -6,17 +6,23 @@
 // d = (c.z / c.w + 1) / 2, and a radius r there is h = scale r / c.w wide.
 #pragma once
 
+#include "elementary.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <utility>
 #include <vector>
 
 namespace ringlet {
 
 inline constexpr int kTile = 16;          // [px] side of a tile
+inline constexpr int kSide = 4;           // tiles along a side of a block: one lane for each tile
 inline constexpr float kOutermost = 1e6f; // [px] a segment that reaches farther is not drawn: its direction is rounding
 
+inline constexpr float kShortest = 1e-4f;  // [px] a shorter segment is not drawn: it has no direction
 inline constexpr float kReach = 0.3f;     // [px] beyond its half width that a segment covers cells of pixels
 
 /// The camera of a picture.
@@ -26,133 +32,123 @@ struct View {
     float scale;       // [px]: half width of a unit radius at unit distance
     float near, far;   // [m] of the clipping planes
 
-    int across() const { return (W + kTile - 1) / kTile; }
-    int down() const { return (H + kTile - 1) / kTile; }
-    int tiles() const { return across() * down(); }
+    // Tiles of a block follow one another, row by row; those outside the picture have numbers too
+    int across() const { return (W + kSide * kTile - 1) / (kSide * kTile); } // blocks
+    int down() const { return (H + kSide * kTile - 1) / (kSide * kTile); }
+    int tiles() const { return across() * down() * kSide * kSide; }
+    int tile(int column, int row) const {
+        return ((row / kSide * across() + column / kSide) * kSide + row % kSide) * kSide + column % kSide;
+    }
+    int left(int tile) const { return (tile / (kSide * kSide) % across() * kSide + tile % kSide) * kTile; } // [px]
+    int top(int tile) const { return (tile / (kSide * kSide) / across() * kSide + tile / kSide % kSide) * kTile; }
 
     /// Depth of what is `distance` [m] away along the line of sight.
     float depth(float distance) const { return far / (far - near) * (1 - near / distance); }
 };
 
-/// A point of a strand: clip space, and what follows from it where it is in front of the near plane.
+/// 16 points (x, y, z) in a row.
+RINGLET_INLINE Vec3<float> read_points(const float *from) {
+    Floats v[3];
+    std::memcpy(v, from, sizeof v);
+    const Floats x = __builtin_shufflevector(v[0], v[1], 0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
+    const Floats y = __builtin_shufflevector(v[0], v[1], 1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
+    const Floats z = __builtin_shufflevector(v[0], v[1], 2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
+    return {__builtin_shufflevector(x, v[2], 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29),
+            __builtin_shufflevector(y, v[2], 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30),
+            __builtin_shufflevector(z, v[2], 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31)};
+}
+
+/// A strand in clip space, and what follows from it where it is in front of the near plane. Arrays are longer than the
+/// strand by at least one and at most 16 lanes, so that no loop ends with points one by one.
 struct ScreenStrand {
+    static constexpr int kStep = kLanes<float>;
+
     std::vector<float> cx, cy, cw, x, y, d, h;
 
-    explicit ScreenStrand(int P) : cx(P), cy(P), cw(P), x(P), y(P), d(P), h(P) {}
+    explicit ScreenStrand(int P) {
+        for (auto *array : {&cx, &cy, &cw, &x, &y, &d, &h}) array->resize((P / kStep + 1) * kStep + 1);
+    }
 
     /// Projects points (P, 3) [m] of widths (P,) [m]; whether all are finite and in front of the near plane.
-    bool project(const View &view, const float *points, const float *widths, int P) {
-        // Copies and promises that nothing overlaps: without them no loop here goes 16 points at a time
-        const View v = view;
-        float *__restrict to_cx = cx.data(), *__restrict to_cy = cy.data(), *__restrict to_cw = cw.data();
-        float *__restrict to_x = x.data(), *__restrict to_y = y.data(), *__restrict to_d = d.data(), *__restrict to_h = h.data();
-        const float *__restrict p = points, *__restrict wide = widths;
-        const float across = 0.5f * v.W, down = 0.5f * v.H, slope = v.far / (v.far - v.near), half = 0.5f * v.scale;
-        int behind = 0;
-#pragma omp simd reduction(| : behind)
-        for (int j = 0; j < P; ++j) {
-            const float a = p[3 * j], b = p[3 * j + 1], c = p[3 * j + 2];
-            const float X = v.M[0][0] * a + v.M[0][1] * b + v.M[0][2] * c + v.M[0][3];
-            const float Y = v.M[1][0] * a + v.M[1][1] * b + v.M[1][2] * c + v.M[1][3];
-            const float w = v.M[3][0] * a + v.M[3][1] * b + v.M[3][2] * c + v.M[3][3], inverse = 1 / w;
-            const float sx = (X * inverse + 1) * across, sy = (1 - Y * inverse) * down, sh = half * wide[j] * inverse;
-            to_cx[j] = X, to_cy[j] = Y, to_cw[j] = w;
-            to_x[j] = sx, to_y[j] = sy, to_d[j] = slope * (1 - v.near * inverse), to_h[j] = sh;
-            behind |= !(w >= v.near) | !(0 * (sx + sy + sh) == 0); // also where something is not finite
+    bool project(const View &v, const float *points, const float *widths, int P) {
+        Mask<float> whole = ~Mask<float>{};
+        for (int j = 0; j < P; j += kStep) {
+            Floats wide;
+            if (P - j >= kStep) {
+                std::memcpy(&wide, widths + j, sizeof wide);
+                whole &= project(v, read_points(points + 3 * j), wide, j);
+                continue;
+            }
+            float last[3 * kStep], last_wide[kStep];
+            for (int k = 0; k < kStep; ++k) {
+                const int from = std::min(j + k, P - 1);
+                std::copy(points + 3 * from, points + 3 * from + 3, last + 3 * k), last_wide[k] = widths[from];
+            }
+            std::memcpy(&wide, last_wide, sizeof wide);
+            whole &= project(v, read_points(last), wide, j);
         }
-        return !behind;
+        return !any<float>(~whole);
+    }
+
+  private:
+    RINGLET_INLINE Mask<float> project(const View &v, const Vec3<float> &p, Floats wide, int j) {
+        const Floats X = v.M[0][0] * p.x + v.M[0][1] * p.y + v.M[0][2] * p.z + v.M[0][3];
+        const Floats Y = v.M[1][0] * p.x + v.M[1][1] * p.y + v.M[1][2] * p.z + v.M[1][3];
+        const Floats w = v.M[3][0] * p.x + v.M[3][1] * p.y + v.M[3][2] * p.z + v.M[3][3], inverse = 1 / w;
+        const Floats sx = (X * inverse + 1) * (0.5f * v.W), sy = (1 - Y * inverse) * (0.5f * v.H), sh = 0.5f * v.scale * wide * inverse;
+        const Floats depth = maximum<float>(v.far / (v.far - v.near) * (1 - v.near * inverse), splat(0.0f));
+        for (const auto &[to, value] : {std::pair(&cx, X), {&cy, Y}, {&cw, w}, {&x, sx}, {&y, sy}, {&d, depth}, {&h, sh}})
+            std::memcpy(to->data() + j, &value, sizeof value);
+        return (w >= v.near) & (0 * (sx + sy + sh) == 0); // false, too, where something is not finite
     }
 };
 
-/// A segment on the screen, 64 bytes; colours are linear along it.
-struct alignas(64) Segment {
-    float x[2], y[2], d[2], h[2];
-    float colour[2][3];
+/// A point as tiles need it.
+struct ScreenPoint {
+    float x, y, d, h;
 };
 
-/// The part of segment j of a strand between the parameters t[0] and t[1] that is in front of the near plane.
-/// False where nothing is.
-inline bool clipped(const View &view, const ScreenStrand &s, const float *widths, int j, Segment &to, float t[2]) {
+/// The part of segment j of a strand that is in front of the near plane. False where nothing is.
+inline bool clipped(const View &view, const ScreenStrand &s, const float *widths, int j, ScreenPoint to[2]) {
     const float w0 = s.cw[j], w1 = s.cw[j + 1];
-    t[0] = w0 < view.near ? (view.near - w0) / (w1 - w0) : 0;
-    t[1] = w1 < view.near ? (view.near - w0) / (w1 - w0) : 1;
     if (!(w0 >= view.near || w1 >= view.near)) return false;
+    const float t[2] = {w0 < view.near ? (view.near - w0) / (w1 - w0) : 0, w1 < view.near ? (view.near - w0) / (w1 - w0) : 1};
     const float slope = view.far / (view.far - view.near);
     for (int end = 0; end < 2; ++end) {
         const auto between = [&](float a, float b) { return t[end] == 0 ? a : t[end] == 1 ? b : a + t[end] * (b - a); };
         const float w = std::max(between(w0, w1), view.near), inverse = 1 / w;
-        to.x[end] = (between(s.cx[j], s.cx[j + 1]) * inverse + 1) * (0.5f * view.W);
-        to.y[end] = (1 - between(s.cy[j], s.cy[j + 1]) * inverse) * (0.5f * view.H);
-        to.d[end] = std::max(slope * (1 - view.near * inverse), 0.0f);
-        to.h[end] = 0.5f * view.scale * between(widths[j], widths[j + 1]) * inverse;
+        to[end].x = (between(s.cx[j], s.cx[j + 1]) * inverse + 1) * (0.5f * view.W);
+        to[end].y = (1 - between(s.cy[j], s.cy[j + 1]) * inverse) * (0.5f * view.H);
+        to[end].d = std::max(slope * (1 - view.near * inverse), 0.0f);
+        to[end].h = 0.5f * view.scale * between(widths[j], widths[j + 1]) * inverse;
     }
     return true;
 }
 
-/// Whether a segment can be drawn: all of it finite, and not endless.
-inline bool drawable(const Segment &s) {
-    float most = 0, sum = 0;
-    for (int end = 0; end < 2; ++end) {
-        most = std::max({most, std::abs(s.x[end]), std::abs(s.y[end]), s.h[end]});
-        sum += s.x[end] + s.y[end] + s.d[end] + s.h[end];
-    }
-    return most < kOutermost && std::isfinite(sum);
-}
+/// A segment on the screen; depth, half width and colour are linear along it.
+struct alignas(64) Segment {
+    float x, y;            // where it begins
+    float ux, uy;          // unit direction
+    float length, inverse; // [px], [1/px]
+    float d, dd, h, dh;    // at the beginning, and what they gain up to the end
+    float colour[3], gain[3];
 
-/// Pixels of a tile, a bit for each in each row.
-struct TilePixels {
-    uint32_t row[kTile];
+    Segment() = default;
 
-    static TilePixels all() {
-        TilePixels pixels;
-        std::fill(pixels.row, pixels.row + kTile, (1u << kTile) - 1);
-        return pixels;
+    Segment(const ScreenPoint &a, const ScreenPoint &b) : x(a.x), y(a.y), d(a.d), dd(b.d - a.d), h(a.h), dh(b.h - a.h) {
+        const float dx = b.x - a.x, dy = b.y - a.y;
+        length = std::sqrt(dx * dx + dy * dy), inverse = 1 / length;
+        ux = dx * inverse, uy = dy * inverse;
     }
 
-    /// Whether a segment of half width `reach` [px], with the tile's corner at (left, top), may touch any of them.
-    bool touched(const Segment &s, float reach, float left, float top) const {
-        const float x0 = s.x[0] - left, y0 = s.y[0] - top, dx = s.x[1] - s.x[0], dy = s.y[1] - s.y[0];
-        const float slope = std::abs(dy) > 1e-3f ? 1 / dy : 0;
-        const float low = std::max(std::min(y0, y0 + dy) - reach, 0.0f), high = std::min(std::max(y0, y0 + dy) + reach, kTile - 1.0f);
-        for (int y = int(low); y <= int(high); ++y) {
-            if (!row[y]) continue;
-            float from = 0, to = 1; // the part of the segment in the row
-            if (slope != 0) {
-                const float a = (y - reach - y0) * slope, b = (y + 1 + reach - y0) * slope;
-                from = std::max(0.0f, std::min(a, b)), to = std::min(1.0f, std::max(a, b));
-                if (from > to) continue;
-            }
-            const float a = x0 + dx * from, b = x0 + dx * to;
-            const int begin = int(std::min(std::max(std::min(a, b) - reach, 0.0f), float(kTile)));
-            const int end = int(std::max(std::min(std::max(a, b) + reach, kTile - 1.0f), -1.0f));
-            if (begin <= end && (row[y] & ((2u << end) - (1u << begin)))) return true;
-        }
-        return false;
+    /// Whether it can be drawn: all of it finite, and neither endless nor a point.
+    bool drawable() const {
+        const float most = std::max({std::abs(x), std::abs(y), std::abs(x + ux * length), std::abs(y + uy * length), h, h + dh});
+        return most < kOutermost && length >= kShortest && std::isfinite(x + y + d + dd + h + dh + length);
     }
+
+    /// Half width [px] at most, with the cells that it covers beyond.
+    float reach() const { return kReach + std::max(h, h + dh); }
 };
-
-/// Calls visit(tile column, tile row) for the tiles that a segment of half width `reach` [px] touches.
-template <class Visit> inline void visit_tiles(const View &view, const Segment &s, float reach, Visit &&visit) {
-    constexpr float per_tile = 1.0f / kTile;
-    const float dx = s.x[1] - s.x[0], dy = s.y[1] - s.y[0], slope = std::abs(dy) > 1e-6f ? 1 / dy : 0;
-    const float top = std::min(s.y[0], s.y[1]) - reach, bottom = std::max(s.y[0], s.y[1]) + reach;
-    const float W = view.across() - 1, H = view.down() - 1;
-    const float left = std::min(s.x[0], s.x[1]) - reach, right = std::max(s.x[0], s.x[1]) + reach;
-    // Compared as numbers: what lies far outside must not wrap when it becomes an integer
-    if (!(bottom >= 0 && top < view.H && right >= 0 && left < view.W)) return;
-    const int first = int(std::max(std::floor(top * per_tile), 0.0f)), last = int(std::min(std::floor(bottom * per_tile), H));
-    for (int row = first; row <= last; ++row) {
-        float from = 0, to = 1; // the part of the segment in the row
-        if (slope != 0) {
-            const float a = (row * kTile - reach - s.y[0]) * slope, b = ((row + 1) * kTile + reach - s.y[0]) * slope;
-            from = std::max(0.0f, std::min(a, b)), to = std::min(1.0f, std::max(a, b));
-            if (from > to) continue;
-        }
-        const float a = s.x[0] + dx * from, b = s.x[0] + dx * to;
-        const float begin = std::max(std::floor((std::min(a, b) - reach) * per_tile), 0.0f);
-        const float end = std::min(std::floor((std::max(a, b) + reach) * per_tile), W);
-        for (int column = int(std::min(begin, W + 1)); column <= int(std::max(end, -1.0f)); ++column) visit(column, row);
-    }
-}
 
 } // namespace ringlet

@@ -14,6 +14,7 @@
 #pragma once
 
 #include "illumination.hpp"
+#include "strand_point.hpp"
 
 namespace ringlet {
 
@@ -23,7 +24,11 @@ struct StrandPoints {
     const uint32_t *key;     // (S,)
     const uint32_t *which;   // (count,) points that are shaded; null: all of them
     int P;
-    double eye[3];
+
+    StrandPoint operator[](size_t k) const {
+        const size_t index = which ? which[k] : k, s = index / P;
+        return {points + 3 * s * P, absorption + 3 * s, key[s], int(index - s * P)};
+    }
 };
 
 /// 16 points of strands, and what does not depend on the light.
@@ -38,23 +43,22 @@ struct FibrePoints {
 constexpr float kPi = 3.14159265f;
 constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
 
-/// Reads the points from `first` on; past the last, the last again.
-inline FibrePoints gather(const StrandPoints &strands, size_t first, size_t count, const Illumination &light) {
+/// Reads 16 points of strands of P points.
+inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (&eye)[3], const Illumination &light) {
     float position[3][16], tangent[3][16], sigma[3][16];
     uint32_t point[16], patch[16];
     for (int i = 0; i < 16; ++i) {
-        const size_t k = std::min(first + i, count - 1), index = strands.which ? strands.which[k] : k, s = index / strands.P;
-        const int j = int(index - s * strands.P);
-        const float *at = strands.points + 3 * index, *root = at - 3 * j;
-        const float *before = j > 0 ? at - 3 : at, *after = j + 1 < strands.P ? at + 3 : at;
+        const int j = points[i].j;
+        const float *root = points[i].root, *at = root + 3 * j;
+        const float *before = j > 0 ? at - 3 : at, *after = j + 1 < P ? at + 3 : at;
         float spacing = 0;
         for (int c = 0; c < 3; ++c) {
             position[c][i] = at[c];
             tangent[c][i] = after[c] - before[c];
-            sigma[c][i] = strands.absorption[3 * s + c];
+            sigma[c][i] = points[i].absorption[c];
             spacing += (root[3 + c] - root[c]) * (root[3 + c] - root[c]);
         }
-        const uint32_t key = mix(strands.key[s]);
+        const uint32_t key = mix(points[i].key);
         // The first segment is held, so its length is the same in every frame and patches do not crawl
         const float patches = std::min(j * std::sqrt(spacing) / kPatch + float(key >> 8) * 0x1p-24f, 1e6f);
         point[i] = mix(key + uint32_t(j));
@@ -69,7 +73,7 @@ inline FibrePoints gather(const StrandPoints &strands, size_t first, size_t coun
     __builtin_memcpy(&p.patch, patch, sizeof patch);
     const auto unit = [](Vec3<float> a) { return (1.0f / square_root<float>(dot(a, a) + 1e-30f)) * a; };
     p.tangent = unit(p.tangent);
-    p.to_eye = unit({float(strands.eye[0]) - x.x, float(strands.eye[1]) - x.y, float(strands.eye[2]) - x.z});
+    p.to_eye = unit({float(eye[0]) - x.x, float(eye[1]) - x.y, float(eye[2]) - x.z});
     // Hair that is seen lies on the eye's side of its voxel, which is thicker than the layer that covers it
     p.x = in_voxels(light, x) + splat(0.5f) * p.to_eye;
     p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
@@ -181,19 +185,36 @@ inline void light_block(FibrePoints &p, const Illumination &light, const FibreTa
     for (int l = 0; l < light.lights; ++l) add_light(p, light, l, tables, normal, radiance);
 }
 
-/// Fills `radiance` (count, 3) of the points that are wanted.
-inline void shade(const StrandPoints &strands, size_t count, const Illumination &light, const FibreTables &tables,
-                  float *radiance, int threads) {
-    const ptrdiff_t blocks = ptrdiff_t((count + 15) / 16);
-#pragma omp parallel for schedule(dynamic, 64) num_threads(threads)
-    for (ptrdiff_t block = 0; block < blocks; ++block) {
-        const size_t first = 16 * size_t(block);
-        FibrePoints p = gather(strands, first, count, light);
+/// Shades points as an eye sees them.
+struct FibreShader : PointShader {
+    const Illumination &light;
+    const FibreTables &tables;
+    double eye[3];
+
+    FibreShader(const Illumination &light, const FibreTables &tables, const double *from)
+        : light(light), tables(tables), eye{from[0], from[1], from[2]} {}
+
+    /// The points from `first` on, 16 of them; past the last, the last again.
+    template <class Points> void block(const Points &from, size_t first, size_t count, int P, float *radiance) const {
+        StrandPoint points[16];
+        for (size_t i = 0; i < 16; ++i) points[i] = from[std::min(first + i, count - 1)];
+        FibrePoints p = gather(points, P, eye, light);
         Floats sum[3];
         light_block(p, light, tables, sum);
         for (size_t i = 0; i < 16 && first + i < count; ++i)
             for (int c = 0; c < 3; ++c) radiance[3 * (first + i) + c] = sum[c][i];
     }
-}
+
+    void shade(const StrandPoint *points, size_t count, int P, float *radiance) const override {
+        for (size_t first = 0; first < count; first += 16) block(points, first, count, P, radiance);
+    }
+
+    /// Fills `radiance` (count, 3) of the points that are wanted.
+    void shade(const StrandPoints &points, size_t count, float *radiance, int threads) const {
+        const ptrdiff_t blocks = ptrdiff_t((count + 15) / 16);
+#pragma omp parallel for schedule(dynamic, 64) num_threads(threads)
+        for (ptrdiff_t block = 0; block < blocks; ++block) this->block(points, 16 * size_t(block), count, points.P, radiance);
+    }
+};
 
 } // namespace ringlet

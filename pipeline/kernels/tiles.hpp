@@ -7,6 +7,7 @@
 
 #include "bins.hpp"
 #include "coverage.hpp"
+#include "elementary.hpp"
 
 namespace ringlet {
 
@@ -26,6 +27,13 @@ struct Backdrop {
     int cell_of(int k) const { return (2 * k + 1) * kCells / (2 * n); }
 };
 
+/// A fragment in a pixel: the bits of its depth, which sort as it does, before the segment's number + 1; 0 is none.
+RINGLET_INLINE uint64_t fragment(float depth, uint32_t number) {
+    uint32_t bits;
+    std::memcpy(&bits, &depth, sizeof bits);
+    return uint64_t(bits) << 32 | (number + 1);
+}
+
 /// A tile while it is drawn.
 class Tile {
   public:
@@ -33,37 +41,77 @@ class Tile {
     static constexpr int kWindow = 2;
     static constexpr float kClosed = 1.0f / 256;
 
-    /// Draws the sorted entries in the pixels that are wanted. Returns those that may lack hair from behind the cut-off.
-    TilePixels draw(const View &view, const Bins &bins, const uint64_t *entry, size_t count, const Backdrop &back, int tile,
-                    const TilePixels &wanted) {
-        const int left = tile % view.across() * kTile, top = tile / view.across() * kTile;
+    Tile(const View &view, const Backdrop &back) : view_(view), back_(back) {}
+
+    /// Starts a tile, of which these pixels are wanted.
+    void begin(int tile, const TilePixels &wanted) {
+        left_ = view_.left(tile), top_ = view_.top(tile);
         drawn_ = wanted;
-        begin(view, back, left, top);
-        // What was left out lies behind the cut-off: only what happens before it is certain
-        uint32_t certain;
-        std::memcpy(&certain, &bins.cut[tile], sizeof certain);
-        TilePixels lacking{};
-        bool passed = false;
-        for (size_t k = 0; k < count && open_count_ > 0; ++k) {
-            if (!passed && entry[k] >> 32 > certain) lacking = open_beyond(bins.cut[tile]), passed = true;
-            if (k + kAhead < count) __builtin_prefetch(&bins.segment(uint32_t(entry[k + kAhead])));
-            segment(bins.segment(uint32_t(entry[k])), float(left), float(top), view, back);
+        open_ = TilePixels::all();
+        open_count_ = kPixels;
+        std::memset(window_, 0, sizeof window_);
+        std::memset(colour_, 0, sizeof colour_);
+        for (int p = 0; p < kPixels; ++p) {
+            const int x = left_ + p % kTile, y = top_ + p / kTile;
+            T_[p] = splat(1.0f), clear_[p] = 1;
+            nearest_[p] = 2, farthest_[p] = -1;
+            if (x >= view_.W || y >= view_.H || !drawn_.has(p % kTile, p / kTile)) {
+                close(p);
+                continue;
+            }
+            for (int j = 0; j < back_.n; ++j)
+                for (int i = 0; i < back_.n; ++i) {
+                    const float d = back_.depth[back_.sample(view_, x, y, i, j)];
+                    nearest_[p] = std::min(nearest_[p], d), farthest_[p] = std::max(farthest_[p], d);
+                }
         }
-        if (!passed) lacking = open_beyond(bins.cut[tile]);
+    }
+
+    bool closed() const { return open_count_ == 0; }
+
+    /// The open pixels that a segment may touch, for `draw`.
+    RINGLET_INLINE Words reached(const Segment &s) const { return crossed(s, float(left_), float(top_), open_, step_); }
+
+    /// Adds the fragments of segment `number` of the block, in the pixels that are still open of those it has reached.
+    RINGLET_INLINE void draw(const Segment *segments, uint32_t number, const Words &reached) {
+        const Segment &s = segments[number];
+        const bool rows = steep(s);
+        const Words open = reached & (rows ? open_.rows : open_.columns);
+        alignas(64) uint32_t pixels[kTile];
+        std::memcpy(pixels, &open, sizeof pixels);
+        for (uint32_t left = set_lanes<float>((Mask<float>)open != 0); left; left &= left - 1) {
+            const int p = __builtin_ctz(left);
+            for (uint32_t bits = pixels[p]; bits; bits &= bits - 1) {
+                const int q = __builtin_ctz(bits), pixel = rows ? p * kTile + q : q * kTile + p;
+                const float d = s.d + crossing(s, pixel).t * s.dd;
+                if (d <= farthest_[pixel]) hold(segments, pixel, fragment(d, number));
+            }
+        }
+    }
+
+    /// Composites what is held back.
+    void finish(const Segment *segments) {
         for (int p = 0; p < kPixels; ++p)
-            for (int i = 0; i < held_[p]; ++i) composite(p, window_[p][i], view, back, left, top);
-        return lacking;
+            for (const uint64_t held : window_[p])
+                if (held) composite(segments, p, held);
+    }
+
+    /// The pixels that are open and see beyond a depth.
+    TilePixels open_beyond(float depth) const {
+        TilePixels pixels = TilePixels::none();
+        for (int p = 0; p < kPixels; ++p)
+            if (is_open(p) && farthest_[p] > depth) pixels.add(p % kTile, p / kTile);
+        return pixels;
     }
 
     /// Writes the pixels that were drawn, linear RGB, into a picture (H, W, 3).
-    void write(const View &view, const Backdrop &back, int tile, float *picture) const {
-        const int left = tile % view.across() * kTile, top = tile / view.across() * kTile;
+    void write(float *picture) const {
         for (int p = 0; p < kPixels; ++p) {
-            const int x = left + p % kTile, y = top + p / kTile;
-            if (x >= view.W || y >= view.H || !(drawn_.row[p / kTile] >> (p % kTile) & 1)) continue;
+            const int x = left_ + p % kTile, y = top_ + p / kTile;
+            if (x >= view_.W || y >= view_.H || !drawn_.has(p % kTile, p / kTile)) continue;
             float behind[3];
-            seen_behind(view, back, p, x, y, behind);
-            float *to = picture + 3 * (size_t(y) * view.W + x);
+            seen_behind(p, x, y, behind);
+            float *to = picture + 3 * (size_t(y) * view_.W + x);
             // What a closed pixel has not seen is as the rest of it
             const bool open = is_open(p);
             const float scale = open ? 1 : 1 / (1 - clear_[p]);
@@ -72,137 +120,76 @@ class Tile {
     }
 
   private:
-    static constexpr int kAhead = 6;
-
+    const View &view_;
+    const Backdrop &back_;
+    int left_ = 0, top_ = 0; // [px]
     Cells T_[kPixels];
-    float clear_[kPixels], colour_[kPixels][3];      // mean of T; linear RGB
-    float nearest_[kPixels], farthest_[kPixels];     // depth of the backdrop
-    Fragment window_[kPixels][kWindow];
-    uint8_t held_[kPixels];
-    uint32_t open_rows_[kTile], open_columns_[kTile]; // a bit for each pixel that is open
-    TilePixels drawn_;
-    int open_count_;
+    float clear_[kPixels], colour_[kPixels][3];  // mean of T; linear RGB
+    float nearest_[kPixels], farthest_[kPixels]; // depth of the backdrop
+    uint64_t window_[kPixels][kWindow];          // fragments, ascending
+    TilePixels open_, drawn_;
+    int open_count_ = 0;
     CellCentres centres_;
+    TileSteps step_;
 
-    /// The pixels that are open and see beyond a depth.
-    TilePixels open_beyond(float depth) const {
-        TilePixels pixels{};
-        for (int p = 0; p < kPixels; ++p)
-            if (is_open(p) && farthest_[p] > depth) pixels.row[p / kTile] |= 1u << p % kTile;
-        return pixels;
-    }
-
-    bool is_open(int p) const { return open_rows_[p / kTile] >> (p % kTile) & 1; }
+    bool is_open(int p) const { return open_.has(p % kTile, p / kTile); }
 
     void close(int p) {
-        open_rows_[p / kTile] &= ~(1u << p % kTile);
-        open_columns_[p % kTile] &= ~(1u << p / kTile);
+        open_.remove(p % kTile, p / kTile);
         --open_count_;
     }
 
-    void begin(const View &view, const Backdrop &back, int left, int top) {
-        std::fill(open_rows_, open_rows_ + kTile, (1u << kTile) - 1);
-        std::fill(open_columns_, open_columns_ + kTile, (1u << kTile) - 1);
-        open_count_ = kPixels;
-        for (int p = 0; p < kPixels; ++p) {
-            const int x = left + p % kTile, y = top + p / kTile;
-            T_[p] = splat(1.0f), clear_[p] = 1, held_[p] = 0;
-            std::fill(colour_[p], colour_[p] + 3, 0.0f);
-            nearest_[p] = 2, farthest_[p] = -1;
-            if (x >= view.W || y >= view.H || !(drawn_.row[p / kTile] >> (p % kTile) & 1)) {
-                close(p);
-                continue;
-            }
-            for (int j = 0; j < back.n; ++j)
-                for (int i = 0; i < back.n; ++i) {
-                    const float d = back.depth[back.sample(view, x, y, i, j)];
-                    nearest_[p] = std::min(nearest_[p], d), farthest_[p] = std::max(farthest_[p], d);
-                }
-        }
+    RINGLET_INLINE Crossing crossing(const Segment &s, int p) const {
+        return Crossing(s, float(left_ + p % kTile) + 0.5f, float(top_ + p / kTile) + 0.5f);
     }
 
-    /// Adds the fragments of a segment, pixel by pixel along its steeper axis.
-    void segment(const Segment &s, float left, float top, const View &view, const Backdrop &back) {
-        const float x0 = s.x[0] - left, y0 = s.y[0] - top, dx = s.x[1] - s.x[0], dy = s.y[1] - s.y[0];
-        const float length = std::sqrt(dx * dx + dy * dy);
-        if (length < 1e-4f) return;
-        const float ux = dx / length, uy = dy / length, margin = 0.02f, half = std::max(s.h[0], s.h[1]);
-        const bool steep = std::abs(uy) >= std::abs(ux);
-        const float p0 = steep ? y0 : x0, q0 = steep ? x0 : y0, up = steep ? uy : ux, uq = steep ? ux : uy;
-        const float p1 = p0 + up * length, reach = half * std::abs(uq) + 0.5f * margin;
-        const int first = std::max(0, int(std::floor(std::max(std::min(p0, p1) - reach, -1.0f))));
-        const int last = std::min(kTile - 1, int(std::floor(std::min(std::max(p0, p1) + reach, float(kTile)))));
-        const float slope = uq / up, wide = (half + margin) / std::abs(up) + (0.5f - margin) * std::abs(slope);
-        const uint32_t *open = steep ? open_rows_ : open_columns_;
-        for (int p = first; p <= last; ++p) {
-            const float middle = q0 + (p + 0.5f - p0) * slope;
-            const int a = int(std::min(std::max(std::floor(middle - wide), 0.0f), float(kTile)));
-            const int b = int(std::max(std::min(std::floor(middle + wide), kTile - 1.0f), -1.0f));
-            if (a > b) continue;
-            for (uint32_t bits = open[p] & ((2u << b) - (1u << a)); bits; bits &= bits - 1) {
-                const int q = __builtin_ctz(bits), x = steep ? q : p, y = steep ? p : q;
-                const float fx = x + 0.5f - x0, fy = y + 0.5f - y0, along = fx * ux + fy * uy;
-                const float t = std::min(std::max(along / length, 0.0f), 1.0f), d = s.d[0] + t * (s.d[1] - s.d[0]);
-                const int pixel = y * kTile + x;
-                if (d > farthest_[pixel]) continue;
-                Fragment f{d, along, fy * ux - fx * uy, length, s.h[0] + t * (s.h[1] - s.h[0]), -uy, ux, {}};
-                for (int c = 0; c < 3; ++c) f.colour[c] = s.colour[0][c] + t * (s.colour[1][c] - s.colour[0][c]);
-                hold(pixel, f, view, back, int(left), int(top));
-            }
+    /// Puts a fragment into its pixel's window; the nearest that the window has no room for is composited.
+    RINGLET_INLINE void hold(const Segment *segments, int p, uint64_t next) {
+        uint64_t *window = window_[p];
+        const uint64_t out = std::min(next, window[0]);
+        for (int i = 0; i < kWindow; ++i) {
+            const uint64_t later = std::max(next, window[i]);
+            window[i] = i + 1 < kWindow ? std::min(later, window[i + 1]) : later;
+            next = later;
         }
+        if (out) composite(segments, p, out);
     }
 
-    /// Puts a fragment into its pixel's window; what the window has no room for is composited, the nearest first.
-    void hold(int p, const Fragment &f, const View &view, const Backdrop &back, int left, int top) {
-        Fragment *window = window_[p];
-        const int held = held_[p];
-        if (held < kWindow) {
-            int i = held;
-            for (; i > 0 && window[i - 1].depth > f.depth; --i) window[i] = window[i - 1];
-            window[i] = f;
-            held_[p] = uint8_t(held + 1);
-        } else if (f.depth < window[0].depth) {
-            composite(p, f, view, back, left, top);
-        } else {
-            composite(p, window[0], view, back, left, top);
-            int i = 1;
-            for (; i < kWindow && window[i].depth <= f.depth; ++i) window[i - 1] = window[i];
-            window[i - 1] = f;
-        }
-    }
-
-    RINGLET_INLINE void composite(int p, const Fragment &f, const View &view, const Backdrop &back, int left, int top) {
+    RINGLET_INLINE void composite(const Segment *segments, int p, uint64_t held) {
         if (!is_open(p)) return;
-        Cells part = covered(f, centres_);
-        if (f.depth > nearest_[p]) part = in_front(part, f.depth, view, back, left + p % kTile, top + p / kTile);
+        const Segment &s = segments[uint32_t(held) - 1];
+        const Crossing at = crossing(s, p);
+        Cells part = covered(s, at, centres_);
+        const float depth = s.d + at.t * s.dd;
+        if (depth > nearest_[p]) part = in_front(part, depth, left_ + p % kTile, top_ + p / kTile);
         const Cells taken = T_[p] * part;
         T_[p] -= taken;
         const float weight = sum_cells(taken) * (1.0f / (kCells * kCells));
-        for (int c = 0; c < 3; ++c) colour_[p][c] += weight * f.colour[c];
+        for (int c = 0; c < 3; ++c) colour_[p][c] += weight * (s.colour[c] + at.t * s.gain[c]);
         clear_[p] -= weight;
         if (clear_[p] < kClosed) close(p);
     }
 
     /// Coverage of the cells whose backdrop is not in front of the depth.
-    static Cells in_front(Cells part, float depth, const View &view, const Backdrop &back, int x, int y) {
+    Cells in_front(Cells part, float depth, int x, int y) const {
         for (int k = 0; k < kCells * kCells; ++k) {
-            const int i = back.sample_of(k % kCells), j = back.sample_of(k / kCells);
-            if (depth > back.depth[back.sample(view, x, y, i, j)]) part[k] = 0;
+            const int i = back_.sample_of(k % kCells), j = back_.sample_of(k / kCells);
+            if (depth > back_.depth[back_.sample(view_, x, y, i, j)]) part[k] = 0;
         }
         return part;
     }
 
     /// Linear RGB of the backdrop times what is seen of it.
-    void seen_behind(const View &view, const Backdrop &back, int p, int x, int y, float behind[3]) const {
+    void seen_behind(int p, int x, int y, float behind[3]) const {
         float sum[3] = {}, plain[3] = {}, seen = 0;
-        for (int j = 0; j < back.n; ++j)
-            for (int i = 0; i < back.n; ++i) {
-                const uint8_t *at = back.samples + 3 * back.sample(view, x, y, i, j);
-                const float T = T_[p][back.cell_of(j) * kCells + back.cell_of(i)];
-                for (int c = 0; c < 3; ++c) sum[c] += T * back.decode[at[c]], plain[c] += back.decode[at[c]];
+        for (int j = 0; j < back_.n; ++j)
+            for (int i = 0; i < back_.n; ++i) {
+                const uint8_t *at = back_.samples + 3 * back_.sample(view_, x, y, i, j);
+                const float T = T_[p][back_.cell_of(j) * kCells + back_.cell_of(i)];
+                for (int c = 0; c < 3; ++c) sum[c] += T * back_.decode[at[c]], plain[c] += back_.decode[at[c]];
                 seen += T;
             }
-        const float all = float(back.n * back.n);
+        const float all = float(back_.n * back_.n);
         for (int c = 0; c < 3; ++c) behind[c] = seen > 0 ? clear_[p] * sum[c] / seen : clear_[p] * plain[c] / all;
     }
 };

@@ -11,7 +11,8 @@ from pipeline import kernels
 from pipeline.body.placement import Placement
 from pipeline.config.schema import Config
 from pipeline.render.camera import CameraPath
-from pipeline.render.coverage import Coverage
+from pipeline.render.chunks import Chunks
+from pipeline.render.coverage import Chunk, Coverage
 from pipeline.render.geometry import (
     Shape,
     choose_shapes,
@@ -32,8 +33,6 @@ from pipeline.strands.random import normal
 Points = NDArray[np.float32]
 Linear = NDArray[np.float32]
 
-CHUNK = 65_536  # strands that are in flight at once
-_KEPT = 100 << 20  # [bytes] points that are kept from the first pass for the second; more are expanded twice
 _MARGIN = 0.02  # [m] that strands may leave the bounds of their guides
 _MELANIN = 31  # salt
 
@@ -93,8 +92,10 @@ class FrameRenderer:
         # Exposure and tone curve apply to what is lit; the background is meant as it is written.
         background = CURVES[render.tone].linear(np.array(scene.background)) / render.gain
         self.target = Target(across, down, tuple(background.tolist()))
+        self._coverage = Coverage(self.target, render.size)
+        self._chunks = Chunks(strands, self.count)
+        self._widths = np.zeros((0, 0), np.float32)
         self._lit: Moment | None = None
-        self._kept: list[tuple[int, Points]] = []
 
     def pixels(self, moment: Moment, view: View | None = None) -> float:
         """Projected width [px] of strands at a moment."""
@@ -130,29 +131,24 @@ class FrameRenderer:
 
     def _picture(self, moment: Moment, camera: View, shape: Shape, pixels: float) -> Linear:
         """The linear picture with all strands drawn in one shape, which are so wide [px]."""
-        if moment is not self._lit:
-            self.strands.frame(moment.guides, moment.pose, moment.moved)
         # Whole margins: the grid of shadows stands still while hair moves a little, so that nothing shimmers
         lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
         upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
         self.target.clear(camera, *self._depths(camera, self._corners(moment, lower, upper)))
-        coverage = Coverage(self.target, self.render.size, camera) if shape == "coverage" else None
+        coverage = self._coverage if shape == "coverage" else None
+        if coverage is not None:
+            coverage.begin(camera)
         if moment is not self._lit:
-            self._kept = self._light(moment, lower, upper, coverage)
-            self._lit = moment
+            self._light(moment, lower, upper, coverage)
         elif coverage is not None:
-            for first, points in self._kept or self._chunks():
+            for first, points in self._chunks:
                 coverage.count(first, points, self._own_widths(points))
-        kept = self._kept
         self._draw_head(moment, camera.position)
         if coverage is not None:
-            shade = partial(self._shade, camera.position)
-            return coverage.draw(
-                lambda: kept or self._chunks(), self._own_widths, self.render.subdivide, shade
-            )
+            return coverage.draw(self._drawn, self.lighting.shader(camera.position))
         wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
         veil = self.lighting.veil(camera.position, wider)
-        for first, points in kept or self._chunks():
+        for first, points in self._chunks:
             self._draw_strands(shape, camera.position, first, points, veil.visible(points))
         return average(self.target.read(), self.render.samples)
 
@@ -162,39 +158,33 @@ class FrameRenderer:
         lower: NDArray[np.float64],
         upper: NDArray[np.float64],
         coverage: Coverage | None,
-    ) -> list[tuple[int, Points]]:
-        """First pass: all strands into the density grid; returns their points where they are few enough to keep."""
-        keep = self.count * self.strands.points * 12 <= _KEPT
-        kept: list[tuple[int, Points]] = []
+    ) -> None:
+        """First pass: all strands into the density grid."""
+        self._chunks.move(moment.guides, moment.pose, moment.moved)
         self.lighting.begin(lower, upper, self.width)
-        for first, points in self._chunks(reuse=not keep):
+        for first, points in self._chunks:
             widths = self._own_widths(points)
             self.lighting.add(points, widths)
             if coverage is not None:
                 coverage.count(first, points, widths)
-            if keep:
-                kept.append((first, points))
         skin = moment.skin or self.skin
         self.lighting.finish(skin.field if skin else None, moment.pose)
-        return kept
+        self._lit = moment
 
-    def _shade(self, eye: Place, first: int, points: Points, which: NDArray[np.uint32]) -> Points:
-        """Linear RGB (n, 3) of points (n,), flat indices, of strands (S, P, 3) from number `first` on."""
-        own = slice(first, first + len(points))
-        return self.lighting.shade(points, self.melanin[own], self.key[own], eye, which)
-
-    def _chunks(self, reuse: bool = True) -> Iterator[tuple[int, Points]]:
-        buffer: Points | None = None
-        for first in range(0, self.count, CHUNK):
-            last = min(first + CHUNK, self.count)
-            if buffer is None or not reuse or len(buffer) != last - first:
-                buffer = np.empty((last - first, self.strands.points, 3), np.float32)
-            yield first, self.strands.chunk(first, last, buffer)
+    def _drawn(self) -> Iterator[Chunk]:
+        """All strands as they are drawn by coverage."""
+        for first, points in self._chunks:
+            own = slice(first, first + len(points))
+            fine = smooth(points, self.render.subdivide)
+            yield fine, self._own_widths(fine), self.lighting.absorption(self.melanin[own]), self.key[own]
 
     def _own_widths(self, points: Points) -> NDArray[np.float32]:
         """Widths (S, P) [m] of strands (S, P, 3)."""
-        profile = np.float32(self.width) * taper(self.render, points.shape[1])
-        return np.ascontiguousarray(np.broadcast_to(profile, points.shape[:2]))
+        strands, count, _ = points.shape
+        if len(self._widths) < strands or self._widths.shape[1] != count:
+            profile = np.float32(self.width) * taper(self.render, count)
+            self._widths = np.ascontiguousarray(np.broadcast_to(profile, (strands, count)))
+        return self._widths[:strands]
 
     def _draw_strands(
         self, shape: Shape, eye: Place, first: int, points: Points, visible: NDArray[np.bool_]

@@ -119,6 +119,14 @@ class Lighting:
         density = np.float32(wider) * frame.hair + np.float32(_OPAQUE) * frame.body
         return Veil(density, np.array(frame.light.origin), frame.light.spacing, eye)
 
+    def absorption(self, melanin: _F32) -> _F32:
+        """Absorption (S, 3) float32 [1/radius] of strands with melanin (S,)."""
+        return fibre.absorption(melanin, self._hair.redness)
+
+    def shader(self, eye: _F64) -> kernels.FibreShader:
+        """Return what shades points of strands as seen from `eye` (3,) float64 [m]."""
+        return kernels.FibreShader(self._finished().light, self._tables, eye)
+
     def shade(
         self, points: _F32, melanin: _F32, key: NDArray[np.uint32], eye: _F64, which: NDArray[np.uint32]
     ) -> _F32:
@@ -126,7 +134,7 @@ class Lighting:
 
         The strands have melanin (S,) and random keys (S,).
         """
-        absorption = fibre.absorption(melanin, self._hair.redness)
+        absorption = self.absorption(melanin)
         return kernels.shade(points, absorption, key, eye, self._finished().light, self._tables, which)
 
     def shade_surface(

@@ -22,6 +22,29 @@ def backdrop(
     return kernels.Backdrop(np.array(np.broadcast_to(depth, shape), np.float32), samples, LINEAR, per_side)
 
 
+def shader() -> kernels.FibreShader:
+    """Fibres under a sky of radiance 1 that show the square root of their absorption."""
+    sums = np.zeros((2, 2, 8), np.float32)
+    sums[1, :, 0] = 1
+    flat = np.ones(4, np.float32)
+    tables = kernels.FibreTables(np.zeros((2, 2, 2, 8), np.float32), sums, flat, 0 * flat, 1.0)
+    none, around = np.zeros((0, 3), np.float32), np.ones((2, 2, 2, 8), np.float32)
+    depth = np.zeros((0, 4, 4, 4), np.float32)
+    light = kernels.Illumination(none, none, np.ones(3, np.float32), (depth, depth, depth), around)
+    return kernels.FibreShader(light, tables, np.array([0.0, 0.0, twin.EYE]))
+
+
+def raster_of(size: tuple[int, int], layers: float = 20.0) -> kernels.Raster:
+    raster = kernels.Raster(size, layers)
+    raster.begin(twin.matrix(*size), twin.scale(size[1]), (twin.NEAR, twin.FAR))
+    return raster
+
+
+def shown(colours: F32) -> tuple[F32, NDArray[np.uint32]]:
+    """Absorption (S, 3) and keys (S,) of strands that show the colours (S, P, 3) of their roots."""
+    return np.ascontiguousarray(colours[:, 0] ** 2), np.zeros(len(colours), np.uint32)
+
+
 def draw(
     points: F32,
     widths: F32,
@@ -31,10 +54,11 @@ def draw(
     chunk: int = 1000,
     **behind: Any,
 ) -> F32:
-    """The picture (H, W, 3) of strands (S, P, 3) with widths (S, P) and linear colours (S, P, 3)."""
+    """The picture (H, W, 3) of strands (S, P, 3) with widths (S, P) and linear colours (S, P, 3), each its root's."""
     width, height = size
     back = backdrop(height, width, **behind)
-    raster = kernels.Raster(size, twin.matrix(*size), twin.scale(height), (twin.NEAR, twin.FAR), layers)
+    raster = raster_of(size, layers)
+    absorption, key = shown(colours)
     for first in range(0, len(points), chunk):
         raster.count(points[first : first + chunk], widths[first : first + chunk], first)
     raster.cut_off(back)
@@ -43,9 +67,8 @@ def draw(
     for _ in range(2):
         for first in range(0, len(points), chunk):
             part = slice(first, first + chunk)
-            seen = raster.add(points[part], widths[part])
-            raster.colour(colours[part].reshape(-1, 3)[seen])
-        wrong = raster.compose(back, picture)
+            raster.add(points[part], widths[part], absorption[part], key[part])
+        wrong = raster.compose(back, shader(), picture)
         if not wrong:
             break
     assert not wrong
@@ -125,15 +148,17 @@ def test_what_is_cut_off_would_not_have_been_seen() -> None:
         assert np.array_equal(draw(points, widths, colours, (64, 64), layers=layers), everything), layers
 
 
-def test_few_points_of_dense_hair_are_seen() -> None:
-    points, widths, _ = bundle(20000, 8, 4, 1.5, 64)
-    back = backdrop(64, 64)
-    raster = kernels.Raster((64, 64), twin.matrix(64, 64), twin.scale(64), (twin.NEAR, twin.FAR), 20.0)
+def test_few_points_of_dense_hair_are_shaded() -> None:
+    points, widths, colours = bundle(20000, 8, 4, 1.5, 64)
+    back, raster = backdrop(64, 64), raster_of((64, 64))
     raster.count(points, widths, 0)
     raster.cut_off(back)
-    part = len(raster.add(points, widths)) / (points.size / 3)
+    raster.add(points, widths, *shown(colours))
+    assert raster.shaded == 0
+    raster.compose(back, shader(), np.zeros((64, 64, 3), np.float32))
+    part = raster.shaded / (points.size / 3)
     print(f"{part:.1%} of the points")
-    assert part < 0.4
+    assert 0 < part < 0.2
 
 
 def test_hair_behind_the_backdrop_is_hidden_to_the_sample() -> None:
@@ -155,10 +180,10 @@ def test_without_hair_the_backdrop_is_averaged() -> None:
     for per_side in (1, 2, 3, 4):
         samples = random.integers(0, 256, (8 * per_side, 8 * per_side, 3)).astype(np.uint8)
         back = kernels.Backdrop(np.ones(samples.shape[:2], np.float32), samples, LINEAR, per_side)
-        raster = kernels.Raster((8, 8), twin.matrix(8, 8), twin.scale(8), (twin.NEAR, twin.FAR), 20.0)
+        raster = raster_of((8, 8))
         raster.cut_off(back)
         picture = np.zeros((8, 8, 3), np.float32)
-        assert raster.compose(back, picture) == 0
+        assert raster.compose(back, shader(), picture) == 0
         mean = (samples / 255).reshape(8, per_side, 8, per_side, 3).mean(axis=(1, 3))
         assert np.abs(picture - mean).max() < 1e-6
 
@@ -199,16 +224,22 @@ def test_broken_strands_leave_the_others_alone(bad: float) -> None:
 
 def test_wrong_shapes_are_refused() -> None:
     points, widths, colours = bundle(5, 6, 8, 0.8, 32)
-    raster = kernels.Raster((32, 32), twin.matrix(32, 32), twin.scale(32), (twin.NEAR, twin.FAR), 20.0)
+    absorption, key = shown(colours)
+    raster = kernels.Raster((32, 32), 20.0)
+    with pytest.raises(ValueError, match="before begin"):
+        raster.count(points, widths, 0)
+    raster = raster_of((32, 32))
     with pytest.raises(ValueError, match="before cut_off"):
-        raster.add(points, widths)
+        raster.add(points, widths, absorption, key)
     with pytest.raises(ValueError, match="another size"):
         raster.cut_off(backdrop(16, 16))
     raster.cut_off(backdrop(32, 32))
     with pytest.raises(ValueError, match="do not fit"):
-        raster.add(points, widths[:, 1:].copy())
-    raster.add(points, widths)
-    with pytest.raises(ValueError, match="no colours"):
-        raster.add(points, widths)
-    with pytest.raises(ValueError, match="a colour for each"):
-        raster.colour(colours[0, :1])
+        raster.add(points, widths[:, 1:].copy(), absorption, key)
+    with pytest.raises(ValueError, match="do not fit"):
+        raster.add(points, widths, absorption[1:], key)
+    raster.add(points, widths, absorption, key)
+    with pytest.raises(ValueError, match="another number of points"):
+        raster.add(points[:, 1:].copy(), widths[:, 1:].copy(), absorption, key)
+    with pytest.raises(ValueError, match="another size"):
+        raster.compose(backdrop(32, 32), shader(), np.zeros((16, 16, 3), np.float32))

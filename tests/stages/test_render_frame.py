@@ -12,7 +12,7 @@ from PIL import Image
 
 from pipeline import cache, kernels
 from pipeline.config.schema import Camera, Config, Groom, Render, Scene
-from pipeline.render import frame as frame_module
+from pipeline.render import chunks
 from pipeline.render.frame import FrameRenderer, Moment, Skin
 from pipeline.render.tone import to_srgb
 from pipeline.strands.expand import Binding, Expansion
@@ -88,10 +88,11 @@ def test_the_background_has_the_colour_of_the_config() -> None:
 def test_any_chunking_gives_the_same_pixels(geometry: str, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = config(geometry=geometry, width=1e-3)
     whole = render(settings, hanging(40))
-    monkeypatch.setattr(frame_module, "CHUNK", 7)
+    monkeypatch.setattr(chunks, "CHUNK", 7)
     assert np.array_equal(render(settings, hanging(40)), whole)
-    monkeypatch.setattr(frame_module, "_KEPT", 0)
-    assert np.array_equal(render(settings, hanging(40)), whole)
+    for some in (2000, 0):
+        monkeypatch.setattr(chunks, "KEPT", some)
+        assert np.array_equal(render(settings, hanging(40)), whole)
 
 
 @pytest.mark.parametrize("geometry", ["coverage", "ribbons", "tubes"])

@@ -1,0 +1,144 @@
+// The tiles of a block, one after another: the block's segments sorted into them, shaded where they are seen, drawn.
+#pragma once
+
+#include "depth_order.hpp"
+#include "strand_point.hpp"
+#include "tiles.hpp"
+
+namespace ringlet {
+
+class Painter {
+  public:
+    size_t shaded = 0; // points
+
+    Painter(const View &view, const Backdrop &back, Bins &bins, const PointShader &shader)
+        : view_(view), bins_(bins), shader_(shader), tile_(view, back) {}
+
+    /// Draws the wrong tiles of a block, and sets what is wrong with them now; how many of them still are.
+    int block(int block, const uint32_t *number, size_t count, uint8_t *wrong, TilePixels *lacking, float *picture) {
+        sort_into_tiles(block, number, count, wrong);
+        int still = 0;
+        for (int tile = block * kCount; tile < (block + 1) * kCount; ++tile) {
+            if (!wrong[tile]) continue;
+            tile_.begin(tile, bins_.wanted.empty() ? TilePixels::all() : bins_.wanted[tile]);
+            order_.begin(entries_[tile - block * kCount]);
+            lacking[tile] = draw(bins_.cut[tile]);
+            tile_.write(picture);
+            wrong[tile] = lacking[tile].some();
+            still += wrong[tile];
+        }
+        return still;
+    }
+
+  private:
+    static constexpr int kCount = kSide * kSide, kAhead = 8;
+    static constexpr size_t kPortion = 256; // entries that are shaded together
+
+    const View &view_;
+    Bins &bins_;
+    const PointShader &shader_;
+    Tile tile_;
+    TileMiddles middle_;
+    DepthOrder order_;
+    std::vector<Segment> segments_; // of the block
+    std::vector<uint32_t> number_;  // of each of them
+    std::vector<uint8_t> shaded_;   // whether it has its colours
+    std::vector<uint64_t> entries_[kCount];
+    std::vector<uint32_t> uncoloured_; // segments that wait for the colours of their points
+    std::vector<uint32_t> unshaded_;   // points
+    std::vector<StrandPoint> to_shade_;
+    std::vector<float> radiance_;
+    Words reached_[kPortion]; // pixels of each entry
+    uint32_t drawn_[kPortion]; // its segment
+
+    void sort_into_tiles(int block, const uint32_t *number, size_t count, const uint8_t *wrong) {
+        const float left = float(view_.left(block * kCount)), top = float(view_.top(block * kCount));
+        TileLanes cut;
+        Mask<float> waiting;
+        std::memcpy(&cut, &bins_.cut[size_t(block) * kCount], sizeof cut);
+        for (int k = 0; k < kCount; ++k) waiting[k] = wrong[block * kCount + k] ? -1 : 0, entries_[k].clear();
+        segments_.resize(count), number_.assign(number, number + count), shaded_.assign(count, 0);
+        for (size_t i = 0; i < count; ++i) {
+            if (i + kAhead < count) __builtin_prefetch(bins_.seen(number[i + kAhead]));
+            const SeenPoint *ends = bins_.seen(number[i]);
+            const Segment &s = segments_[i] = Segment(ends[0].at, ends[1].at);
+            const Touch touch(s, middle_, left, top);
+            alignas(64) float depth[kCount];
+            std::memcpy(depth, &touch.depth, sizeof depth);
+            for (uint32_t tiles = set_lanes<float>(touch.tiles & waiting & (touch.nearest <= cut)); tiles; tiles &= tiles - 1) {
+                const int k = __builtin_ctz(tiles);
+                entries_[k].push_back(fragment(depth[k], uint32_t(i)));
+            }
+        }
+    }
+
+    /// Draws the entries of a tile; the pixels that may lack hair from behind the cut-off.
+    TilePixels draw(float cut) {
+        // What was left out lies behind the cut-off: only what happens before it is certain
+        const uint64_t certain = fragment(cut, UINT32_MAX - 1);
+        TilePixels lacking = TilePixels::none();
+        bool passed = false;
+        for (size_t k = 0; k < order_.size() && !tile_.closed(); k += kPortion) {
+            const size_t end = std::min(k + kPortion, order_.size()), count = end - k;
+            const uint64_t *entry = order_.sorted(end) + k;
+            for (size_t i = 0; i < count; ++i) {
+                drawn_[i] = uint32_t(entry[i]) - 1;
+                reached_[i] = tile_.reached(segments_[drawn_[i]]);
+                if (any<float>((Mask<float>)reached_[i] != 0)) want(drawn_[i]);
+            }
+            shade();
+            for (size_t i = 0; i < count && !tile_.closed(); ++i) {
+                if (!passed && entry[i] > certain) lacking = tile_.open_beyond(cut), passed = true;
+                tile_.draw(segments_.data(), drawn_[i], reached_[i]);
+            }
+        }
+        if (!passed) lacking = tile_.open_beyond(cut);
+        tile_.finish(segments_.data());
+        return lacking;
+    }
+
+    /// Notes that segment i of the block needs its colours.
+    void want(uint32_t i) {
+        if (shaded_[i]) return;
+        shaded_[i] = 1;
+        __builtin_prefetch(bins_.seen(number_[i]));
+        uncoloured_.push_back(i);
+    }
+
+    /// Shades the points that are wanted, and colours the segments. Another thread may shade the same point beside this
+    /// one, to the same bits.
+    void shade() {
+        for (const uint32_t i : uncoloured_)
+            for (uint32_t point = number_[i]; point < number_[i] + 2; ++point)
+                if (!(known(point) & SeenPoint::kKnown)) unshaded_.push_back(point);
+        std::sort(unshaded_.begin(), unshaded_.end());
+        unshaded_.erase(std::unique(unshaded_.begin(), unshaded_.end()), unshaded_.end());
+        to_shade_.clear();
+        for (const uint32_t number : unshaded_) {
+            const Batch &batch = bins_.batch(number);
+            const uint32_t point = bins_.seen(number)->number & ~SeenPoint::kKnown, strand = point / uint32_t(bins_.P);
+            to_shade_.push_back({batch.points.data + size_t(strand) * bins_.P * 3, batch.absorption.data + 3 * size_t(strand),
+                                 batch.key[strand], int(point - strand * uint32_t(bins_.P))});
+        }
+        shaded += to_shade_.size();
+        radiance_.resize(3 * to_shade_.size());
+        shader_.shade(to_shade_.data(), to_shade_.size(), bins_.P, radiance_.data());
+        for (size_t i = 0; i < unshaded_.size(); ++i) {
+            SeenPoint &to = *bins_.seen(unshaded_[i]);
+            for (int c = 0; c < 3; ++c) __atomic_store(&to.colour[c], &radiance_[3 * i + c], __ATOMIC_RELAXED);
+            __atomic_fetch_or(&to.number, SeenPoint::kKnown, __ATOMIC_RELEASE);
+        }
+        for (const uint32_t i : uncoloured_) {
+            const SeenPoint *ends = bins_.seen(number_[i]);
+            for (int c = 0; c < 3; ++c) {
+                segments_[i].colour[c] = ends[0].colour[c];
+                segments_[i].gain[c] = ends[1].colour[c] - ends[0].colour[c];
+            }
+        }
+        unshaded_.clear(), uncoloured_.clear();
+    }
+
+    uint32_t known(uint32_t point) const { return __atomic_load_n(&bins_.seen(point)->number, __ATOMIC_ACQUIRE); }
+};
+
+} // namespace ringlet
