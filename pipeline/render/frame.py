@@ -23,8 +23,9 @@ from pipeline.render.geometry import (
     smooth_colours,
     taper,
 )
+from pipeline.render.layers import Layers
 from pipeline.render.lighting import Lighting
-from pipeline.render.target import Target
+from pipeline.render.target import DECODED, Target, encode
 from pipeline.render.tone import CURVES, Pixels, average, develop
 from pipeline.render.view import Place, View
 from pipeline.strands.expand import Expansion, MovedSkin
@@ -92,6 +93,7 @@ class FrameRenderer:
         # Exposure and tone curve apply to what is lit; the background is meant as it is written.
         background = CURVES[render.tone].linear(np.array(scene.background)) / render.gain
         self.target = Target(across, down, tuple(background.tolist()))
+        self.background = DECODED[encode(background)]
         self._coverage = Coverage(self.target, render.size)
         self._chunks = Chunks(strands, self.count)
         self._widths = np.zeros((0, 0), np.float32)
@@ -129,17 +131,22 @@ class FrameRenderer:
         pictures = [self._picture(moment, camera, shape, pixels) * np.float32(part) for shape, part in parts]
         return np.asarray(pictures[0] + pictures[1])
 
+    def layers(self, moment: Moment, view: View) -> Layers:
+        """What the picture shows besides colours that `linear` has just given of this moment."""
+        if moment is not self._lit:
+            raise ValueError("layers are those of the moment that was rendered last")
+        self._clear(moment, view)
+        self._draw_head(moment, view.position)
+        return self._coverage.layers(self._drawn, view)
+
     def _picture(self, moment: Moment, camera: View, shape: Shape, pixels: float) -> Linear:
         """The linear picture with all strands drawn in one shape, which are so wide [px]."""
-        # Whole margins: the grid of shadows stands still while hair moves a little, so that nothing shimmers
-        lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
-        upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
-        self.target.clear(camera, *self._depths(camera, self._corners(moment, lower, upper)))
+        self._clear(moment, camera)
         coverage = self._coverage if shape == "coverage" else None
         if coverage is not None:
             coverage.begin(camera)
         if moment is not self._lit:
-            self._light(moment, lower, upper, coverage)
+            self._light(moment, coverage)
         elif coverage is not None:
             for first, points in self._chunks:
                 coverage.count(first, points, self._own_widths(points))
@@ -152,16 +159,13 @@ class FrameRenderer:
             self._draw_strands(shape, camera.position, first, points, veil.visible(points))
         return average(self.target.read(), self.render.samples)
 
-    def _light(
-        self,
-        moment: Moment,
-        lower: NDArray[np.float64],
-        upper: NDArray[np.float64],
-        coverage: Coverage | None,
-    ) -> None:
+    def _clear(self, moment: Moment, camera: View) -> None:
+        self.target.clear(camera, *self._depths(camera, self._corners(moment, *_bounds(moment))))
+
+    def _light(self, moment: Moment, coverage: Coverage | None) -> None:
         """First pass: all strands into the density grid."""
         self._chunks.move(moment.guides, moment.pose, moment.moved)
-        self.lighting.begin(lower, upper, self.width)
+        self.lighting.begin(*_bounds(moment), self.width)
         for first, points in self._chunks:
             widths = self._own_widths(points)
             self.lighting.add(points, widths)
@@ -241,6 +245,14 @@ class FrameRenderer:
         forward = np.subtract(camera.look_at, camera.position)
         depth = (corners - camera.position) @ (forward / np.linalg.norm(forward))
         return float(depth.min()) - _MARGIN, float(depth.max()) + _MARGIN
+
+
+def _bounds(moment: Moment) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners (3,) [m] of a box around the hair, in whole margins: the grid of shadows stands still while hair moves a
+    little, so that nothing shimmers.
+    """
+    lower, upper = (bound(moment.guides, axis=(0, 1)).astype(np.float64) for bound in (np.min, np.max))
+    return _MARGIN * np.floor(lower / _MARGIN - 1), _MARGIN * np.ceil(upper / _MARGIN + 1)
 
 
 def _box_corners(box: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,30 +1,35 @@
-"""Stage 4, the frames: reads groom.h5, guides.h5 and strands.h5, writes frames/0001.png and so on.
+"""Stage 4, the frames: reads groom.h5, guides.h5 and strands.h5, writes frames/0001.png and so on, and 0001.exr if wanted.
 
 Every PNG says in its text chunks which key it was made from, by which libraries, and the fingerprint of the
 renderer: under one fingerprint the same key gives the same pixels.
 """
 
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline import cache, kernels
 from pipeline.body.normals import point_curvature
+from pipeline.cache import exr
 from pipeline.cache.expansion import body_frames, distance_field, expansion_from, placement
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.render.body import DrawnBody
 from pipeline.render.camera import CameraPath
 from pipeline.render.frame import FrameRenderer, Moment, Skin
+from pipeline.render.layers import Layers
 from pipeline.render.passes import mean, passes
 from pipeline.render.target import Target
 from pipeline.render.tone import Pixels
+from pipeline.render.view import View
 
 Record = dict[str, Any]
 
@@ -34,6 +39,8 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
 
     Raises InputError when there is no off-screen OpenGL or the disk is full; Missing or Damaged for caches.
     """
+    if config.render.exr:
+        exr.library()
     wanted = frames or range(1, config.simulate.frames + 1)
     with cache.open(experiment.groom, "groom") as groom, cache.open(experiment.strands, "strands") as strands:
         expansion = expansion_from(groom, strands, config)
@@ -47,7 +54,7 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
     shape = ""
     with (
         cache.open_guides(experiment.guides) as guides,
-        _writer() as write,
+        _writer(experiment.frames) as write,
         track("render", len(wanted)) as bar,
     ):
         moments = Moments(guides, body)
@@ -57,13 +64,33 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
             if name != shape:
                 say("render", f"strands are {name}, {pixels_wide:.2g} px wide, from frame {number} on")
                 shape = name
-            picture = renderer.developed(
-                mean(renderer.linear(moments.at(number, shot.back), shot.view) for shot in shots)
-            )
+            linear, layers = _frame(renderer, ((moments.at(number, shot.back), shot.view) for shot in shots))
             texts |= {"geometry": name, "frame": str(number), "fingerprint": fingerprint(renderer.target)}
-            write(experiment.frames / f"{number:04d}.png", picture, key, record, dict(texts))
+            made = Made(experiment.frames / f"{number:04d}", key, record, dict(texts))
+            if layers is not None:
+                write(made.layers, layers.channels(linear, renderer.background))
+            write(made.picture, renderer.developed(linear))
             bar.advance()
     renderer.target.close()
+
+
+def _frame(
+    renderer: FrameRenderer, shots: Iterable[tuple[Moment, View]]
+) -> tuple[NDArray[np.float32], Layers | None]:
+    """The mean of some views, linear (H, W, 3), and where the config wants them its layers."""
+    if not renderer.render.exr:
+        return mean(renderer.linear(*shot) for shot in shots), None
+    strands: list[NDArray[np.uint32]] = []
+
+    def both() -> Iterator[NDArray[np.float32]]:
+        for shot in shots:
+            linear, layers = renderer.linear(*shot), renderer.layers(*shot)
+            if not strands:
+                strands.append(layers.strand)
+            yield np.concatenate([linear, layers.planes], axis=2)
+
+    planes = mean(both())
+    return planes[..., :3], Layers(planes[..., 3:], strands[0])
 
 
 class Moments:
@@ -102,32 +129,46 @@ def _processor() -> str:
     return " ".join(dict.fromkeys(line.split(":", 1)[1].strip() for line in lines if line.startswith(wanted)))
 
 
-class _Write:
-    """Writes one picture at a time beside the rendering of the next."""
+@dataclass(frozen=True)
+class Made:
+    """A frame that was made: its files, but for their suffix, and what they say of it."""
 
-    def __init__(self, pool: ThreadPoolExecutor) -> None:
-        self._pool = pool
+    path: Path
+    key: str
+    record: Record
+    texts: dict[str, str]
+
+    def picture(self, pixels: Pixels) -> None:
+        """Write the PNG."""
+        cache.write_picture(self.path.with_suffix(".png"), pixels, self.key, self.record, **self.texts)
+
+    def layers(self, channels: Mapping[str, NDArray[Any]]) -> None:
+        """Write the EXR."""
+        cache.write_layers(self.path.with_suffix(".exr"), channels, self.key, self.record, **self.texts)
+
+
+class _Write:
+    """Writes one file at a time beside the rendering of the next frame."""
+
+    def __init__(self, pool: ThreadPoolExecutor, folder: Path) -> None:
+        self._pool, self._folder = pool, folder
         self._last: Future[None] | None = None
 
-    def __call__(self, path: Path, picture: Pixels, key: str, record: Record, texts: dict[str, str]) -> None:
+    def __call__(self, write: Callable[[Any], None], what: Any) -> None:
         self.wait()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._last = self._pool.submit(_write_picture, path, picture, key, record, texts)
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._last = self._pool.submit(write, what)
 
     def wait(self) -> None:
-        """Wait for the picture that is being written; raises what went wrong with it."""
+        """Wait for the file that is being written; raises what went wrong with it."""
         if self._last is not None:
             self._last.result()
 
 
-def _write_picture(path: Path, picture: Pixels, key: str, record: Record, texts: dict[str, str]) -> None:
-    cache.write_picture(path, picture, key, record, **texts)
-
-
 @contextmanager
-def _writer() -> Iterator[_Write]:
+def _writer(folder: Path) -> Iterator[_Write]:
     with ThreadPoolExecutor(1) as pool:
-        writer = _Write(pool)
+        writer = _Write(pool, folder)
         yield writer
         writer.wait()
 
