@@ -85,7 +85,7 @@ sweep: $(if $(NAME),outputs/$(NAME)/sweep) ## all experiments of CONFIG's [sweep
 
 # --- Checks --------------------------------------------------------------------------------------
 
-.PHONY: test lint validate interpolation gallery docs site images approve bench sanitize schema
+.PHONY: test lint validate interpolation gallery docs site images approve bench sanitize schema coverage wheel
 test: env ## all tests
 	$(BIN)/pytest -n 2 --dist loadfile
 
@@ -124,6 +124,15 @@ bench: env ## the figures of the README
 
 schema: env ## configs/schema.json, after a change of pipeline/config/schema/
 	$(RINGLET) config --schema >configs/schema.json
+
+coverage: env ## the tests once more, and which lines of Python they never ran; fails below 90 %
+	rm -f .coverage .coverage.*
+	$(BIN)/coverage run -m pytest -n 2 --dist loadfile
+	$(BIN)/coverage combine -q
+	$(BIN)/coverage report
+
+wheel: env ## a wheel for this Python, installed and tried in an environment of its own
+	.ci/wheel dist
 
 sanitize: env ## kernels under the address and undefined-behaviour sanitizers
 	tests/kernels/sanitize.sh

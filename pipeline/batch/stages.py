@@ -67,12 +67,22 @@ class Batch:
                 if not state.fresh:
                     self._renew(stage, state)
         elif stage != "render":
-            self.sharing.note(self.keys[stage])
+            with cache.where_writable():
+                self.sharing.note(self.keys[stage])
+                self._tidy(stage)
         if touch and state.fresh:
             say(stage, "fresh")
         if touch:
-            for path in self.outputs(stage, frames):
-                _touch(path)
+            with cache.where_writable():
+                for path in self.outputs(stage, frames):
+                    _touch(path)
+
+    def _tidy(self, stage: str) -> None:
+        """Remove the segments of a simulation that was killed after its last frame, when they had been put together."""
+        segments = cache.Segments(self.file("simulate"), self.keys["simulate"])
+        if stage == "simulate" and segments.folder.exists() and not self.experiment.workers_on(stage):
+            with self.experiment.working_on(stage):
+                segments.remove()
 
     def _renew(self, stage: str, state: State) -> None:
         """Take the file from another experiment that has it, else make it."""
@@ -180,7 +190,7 @@ def _identity(path: Path) -> tuple[int, ...]:
 
 def _touch(path: Path) -> None:
     """Give a file the current time, without having to verify it again."""
-    key = _verified.pop(_identity(path), None)
+    key = _verified.get(_identity(path))
     os.utime(path)
     if key is not None:
         _verified[_identity(path)] = key

@@ -1,6 +1,6 @@
 """What every stage leaves behind: one HDF5 file that is whole, verified and keyed by what it was made from."""
 
-from pipeline.cache.atomic import replacing
+from pipeline.cache.atomic import replacing, where_writable
 from pipeline.cache.columns import Column, ColumnWriter, Damaged
 from pipeline.cache.experiment import Experiment
 from pipeline.cache.guides import GuidesReader, GuidesWriter, create_guides, open_guides
@@ -28,6 +28,7 @@ __all__ = [
     "open_guides",
     "picture_record",
     "replacing",
+    "where_writable",
     "write_layers",
     "write_picture",
 ]

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 
+_NOT_OURS = (errno.EROFS, errno.EACCES, errno.EPERM)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -24,6 +25,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f"{path.name}.tmp.{socket.gethostname()}.{os.getpid()}")
+    temporary.unlink(missing_ok=True)  # of a process of our number that is no more, as containers bring forth
     try:
         yield temporary
         sync(temporary)
@@ -35,6 +37,16 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def where_writable() -> Iterator[None]:
+    """Leave out what only spares later runs some work, in a folder that may be read and not written."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _NOT_OURS:
+            raise
 
 
 def sync(path: Path) -> None:
@@ -59,9 +71,14 @@ def disk_full(path: Path) -> InputError:
     )
 
 
+def stale_files(folder: Path) -> list[Path]:
+    """The temporary files of processes of this host that are no more."""
+    return [path for path in folder.glob(f"*.tmp.{socket.gethostname()}.*") if not _alive(path)]
+
+
 def remove_stale(folder: Path) -> list[Path]:
-    """Remove the temporary files of processes of this host that are no more; return their paths."""
-    stale = [path for path in folder.glob(f"*.tmp.{socket.gethostname()}.*") if not _alive(path)]
+    """Remove these files; return their paths."""
+    stale = stale_files(folder)
     for path in stale:
         path.unlink(missing_ok=True)
     return stale

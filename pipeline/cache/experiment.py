@@ -40,6 +40,11 @@ class Experiment:
         """What its runs have said, as JSON lines (see pipeline/log.py)."""
         return self.folder / "log.jsonl"
 
+    @property
+    def working_folders(self) -> tuple[Path, ...]:
+        """Where files are written."""
+        return self.folder, self.frames, self.guides.with_suffix(".segments")
+
     def files(self, stage: str) -> tuple[Path, ...]:
         """The file of a stage before the render, then those that go with it."""
         return {
@@ -56,7 +61,7 @@ class Experiment:
         with its process. Temporary files of dead processes are removed on the way.
         """
         with locked(self.folder / "locks" / stage, stage, str(self.folder), frames):
-            for folder in (self.folder, self.frames, self.guides.with_suffix(".segments")):
+            for folder in self.working_folders:
                 remove_stale(folder)
             yield
 

@@ -60,6 +60,13 @@ class Segments:
                 self._done += count
         return self._done, checkpoint
 
+    def count(self) -> int:
+        """Number of frames that `resume` would find done; changes nothing."""
+        done = 0
+        while (segment := self._whole(self.folder / f"{done:08d}.h5")) and segment[0] > 0:
+            done += segment[0]
+        return done
+
     def append(self, frames: Sequence[Frame], checkpoint: Mapping[str, NDArray[Any]]) -> None:
         """Store the next frames and the state after the last of them, arrays of any shape; call `resume` first."""
         with create(self._path(), KIND, self.key) as writer:

@@ -1,9 +1,8 @@
-"""One HDF5 file of the cache: columns, a record of where it came from, and a seal over both.
+"""One HDF5 file of the cache: columns, and a record of where it came from; sealed (see seal.py).
 
     <columns>                     as the stage names them, for example strands/points
     provenance/kind, key          what the file is, and the key of what it was made from
     provenance/record, meta       JSON; host and wall time are in the record and nowhere else
-    provenance/seal               CRC-32 of all of the above and of the shape and checksums of every column
     checksums/<column>            CRC-32 of every chunk of rows, before compression
 
 The seal is checked when a file is opened, a chunk's checksum when it is read, so that nothing damaged goes
@@ -22,10 +21,10 @@ from typing import Any
 
 import h5py
 import numpy as np
-from isal import isal_zlib
 from numpy.typing import ArrayLike, DTypeLike
 
 from pipeline import kernels
+from pipeline.cache import seal
 from pipeline.cache.atomic import disk_full, no_room, remove_stale, replacing
 from pipeline.cache.columns import Column, ColumnWriter, Damaged
 from pipeline.errors import InputError
@@ -65,8 +64,8 @@ class Writer:
         self._columns[name] = ColumnWriter(self.file, name, row_shape, dtype, chunk_rows)
         return self._columns[name]
 
-    def seal(self) -> None:
-        """Write what is left of the columns, then the record and the seal."""
+    def finish(self) -> None:
+        """Write what is left of the columns, then the record."""
         for name, column in self._columns.items():
             column.close()
             self.file[f"checksums/{name}"] = np.array(column.checksums, np.uint32)
@@ -81,7 +80,6 @@ class Writer:
         texts = {"kind": self.kind, "key": self.key, "record": _json(record), "meta": _json(self.meta)}
         for name, text in texts.items():
             self.file[f"provenance/{name}"] = np.bytes_(text.encode())
-        self.file["provenance/seal"] = np.uint32(_seal(self.file))
 
 
 class Reader:
@@ -123,8 +121,9 @@ def create(path: Path, kind: str, key: str, provenance: dict[str, Any] | None = 
         try:
             writer = Writer(file, kind, key, provenance or {})
             yield writer
-            writer.seal()
+            writer.finish()
             file.close()
+            seal.seal(temporary)
         except BaseException as error:
             with suppress(OSError, RuntimeError, ValueError):  # the error that is under way says more
                 file.close()
@@ -142,34 +141,23 @@ def open(path: Path, kind: str | None = None) -> Iterator[Reader]:
     """
     if not path.exists():
         raise Missing(path)
+    seal.check(path)
     try:
         file = h5py.File(path, "r", locking=False)
     except OSError as error:
         raise Damaged(path, "not a readable HDF5 file") from error
     with file:
-        reader = _sealed(path, file)
+        reader = _reader(path, file)
         if kind is not None and reader.kind != kind:
             raise InputError(f"{path}: a file of kind {reader.kind}; expected {kind}")
         yield reader
 
 
-def _sealed(path: Path, file: h5py.File) -> Reader:
+def _reader(path: Path, file: h5py.File) -> Reader:
     try:
-        right = int(file["provenance/seal"][()]) == _seal(file)
-        reader = Reader(path, file)
+        return Reader(path, file)
     except (OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError) as error:
         raise Damaged(path, "not a file of the cache, or its structure is broken") from error
-    if not right:
-        raise Damaged(path, "the seal does not fit the content")
-    return reader
-
-
-def _seal(file: h5py.File) -> int:
-    parts = [_text(file, name) for name in ("kind", "key", "record", "meta")]
-    for name in sorted(_datasets(file["checksums"])):
-        column, checksums = file[name], file[f"checksums/{name}"][:]
-        parts += [name, repr(column.shape), column.dtype.str, repr(column.chunks), checksums.tobytes().hex()]
-    return int(isal_zlib.crc32("\n".join(parts).encode()))
 
 
 def _datasets(group: h5py.Group) -> list[str]:

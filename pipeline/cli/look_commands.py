@@ -28,17 +28,16 @@ def status(
     outputs: Outputs = OUTPUTS,
     json: Json = False,
 ) -> None:
-    """Tell which stages are fresh, and which value made the others stale."""
+    """Tell which stages are fresh, which value made the others stale, who is at work, and what the disk holds."""
     from pipeline.batch.stages import Batch
+    from pipeline.cli.status import examine, lines
 
     loaded = load_config(config, settings)
-    states = Batch(loaded.config, experiment_of(loaded, outputs)).states()
+    found = examine(Batch(loaded.config, experiment_of(loaded, outputs)))
     if json:
-        stages = [{"name": s.name, "fresh": s.fresh, "reason": s.reason} for s in states]
-        print_json({"name": loaded.config.name, "stages": stages})
-        return
-    for state in states:
-        print(f"{state.name:<12} {'fresh' if state.fresh else 'stale: ' + state.reason}")
+        print_json(found)
+    else:
+        print(*lines(found), sep="\n")
 
 
 @app.command(group=LOOK_GROUP, sort_key=2)

@@ -1,11 +1,9 @@
 """Entry point: runs a command and turns what went wrong into a message and an exit code."""
 
 import os
-import signal
 import sys
 import traceback
 from collections.abc import Sequence
-from types import FrameType
 from typing import NoReturn
 
 from cyclopts import CycloptsError
@@ -19,18 +17,16 @@ from pipeline.cli import (  # noqa: F401, they add their commands
     farm_commands,
     look_commands,
     run_commands,
+    signals,
     sweep_commands,
 )
 from pipeline.cli.base import app
-from pipeline.errors import DONE, FAULT, WRONG_INPUT, Stopped, verdict
-
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-_IGNORED_AGAIN_S = 0.05
+from pipeline.errors import DONE, FAULT, WRONG_INPUT, verdict
 
 
 def main() -> NoReturn:
     """Run the command line of this process and exit."""
-    _listen()
+    signals.listen()
     try:
         code = call(sys.argv[1:])
     except Exception:  # noqa: BLE001, whatever is left is a fault of ours
@@ -38,9 +34,7 @@ def main() -> NoReturn:
             f"{traceback.format_exc()}ringlet: this is a fault of ringlet; please report it with the lines above"
         )
         code = FAULT
-    for number in _SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, signal.SIG_DFL)
+    signals.finish()
     raise SystemExit(code)
 
 
@@ -62,30 +56,3 @@ def call(arguments: Sequence[str]) -> int:
         log.error(text)
         return code
     return code if isinstance(code, int) else DONE
-
-
-def _listen() -> None:
-    """Stop at a signal in an orderly way; one that the parent has switched off, as nohup does, stays so."""
-    for number in _SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _stop)
-    sys.unraisablehook = _unraisable
-
-
-def _stop(number: int, _frame: FrameType | None) -> NoReturn:
-    """Raise, so that temporary files are removed on the way out; at a second signal end at once, as whole."""
-    for other in _SIGNALS:
-        if signal.getsignal(other) is not signal.SIG_IGN:
-            signal.signal(other, lambda again, _frame: os._exit(128 + again))
-    raise Stopped(number)
-
-
-def _unraisable(lost: "sys.UnraisableHookArgs") -> None:
-    """Raise again, a moment later, what a signal raised where Python cannot: in a finaliser or a callback from C."""
-    stopped = lost.exc_value
-    if not isinstance(stopped, Stopped):
-        sys.__unraisablehook__(lost)
-        return
-    number = stopped.code - 128
-    signal.signal(signal.SIGALRM, lambda _number, frame: _stop(number, frame))
-    signal.setitimer(signal.ITIMER_REAL, _IGNORED_AGAIN_S)

@@ -6,6 +6,7 @@ kept with the file (`provenance`), so that `explain` can name the value that mad
 
 import hashlib
 import json
+import time
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,7 @@ _UPSTREAM: dict[str, tuple[str, ...]] = {
     "render": ("groom", "simulate", "interpolate"),
 }
 _NOT_SOURCES = (".pyc", ".pyi", ".so")
+_SETTLED_S = 2.0
 _SHARED_CODE = ("kernels", "strands", "body", "cache")
 
 
@@ -114,13 +116,20 @@ def code_version(stage: str) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """Hash of a file's content; remembered while its size and time stay the same."""
+    """Hash of a file's content; remembered while the file system says that nobody wrote to it."""
     status = path.stat()
-    return _file_digest(path, status.st_size, status.st_mtime_ns)
+    if time.time() - status.st_ctime < _SETTLED_S:
+        return _read_digest(path)  # it may be written once more within the same tick of the clock
+    # Unlike the time of the content, that of the entry cannot be set back.
+    return _digest_of(path, status.st_ino, status.st_size, status.st_ctime_ns)
 
 
 @lru_cache(maxsize=4096)
-def _file_digest(path: Path, size: int, time: int) -> str:  # noqa: ARG001, they are the memory's key
+def _digest_of(path: Path, *_state: int) -> str:
+    return _read_digest(path)
+
+
+def _read_digest(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=8)).hexdigest()
 

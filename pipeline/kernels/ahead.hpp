@@ -15,13 +15,13 @@
 namespace ringlet {
 
 template <class Real> struct Ahead {
-    Vec3<Real> *v, *m;
+    Vec3<Real> *v, *m; // velocities and directors there
     Vec3<Real> *by; // how far edges are ahead
-    Lanes<Real> *s, *twist;
+    Lanes<Real> *s;
 
     Ahead(Arena &arena, int P)
         : v(arena.take<Vec3<Real>>(P)), m(arena.take<Vec3<Real>>(P)), by(arena.take<Vec3<Real>>(P)),
-          s(arena.take<Lanes<Real>>(P)), twist(arena.take<Lanes<Real>>(P)) {}
+          s(arena.take<Lanes<Real>>(P)) {}
 
     /// Takes the edges from the start to where they are expected after theta_dt, held points having the velocities u, but
     /// turned by no more than `most` [rad]. Returns the directors there.
@@ -42,11 +42,10 @@ template <class Real> struct Ahead {
             edges.d[j] = edges.il[j] * edge;
             m[j] = squared(transport(from.m[j], before, edges.d[j]), edges.d[j]);
         }
-        std::copy_n(from.twist, b.P, twist);
-        if (twists) directors.relax(b, edges.d, m, twist, s);
+        if (twists) directors.relax(b, edges.d, m, from.twist, s);
         for (int j = 0; j < b.P - 1; ++j) s[j] = s[j] * reciprocal<Real>(edges.il[j]);
         edges.ahead = by, edges.ahead_s = s;
-        return m;
+        return twists ? directors.m : m;
     }
 };
 

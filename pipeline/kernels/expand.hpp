@@ -93,8 +93,19 @@ class Skin {
         bound_ = at_root_;
     }
 
-    /// Tilts the segment t of length `whole` from x away from the head so that its end, at arc length s, is outside.
+    /// Tilts the segment t of length `whole` from x away from the head so that its end, at arc length s, is outside, and
+    /// its middle too: an ear is thinner than a segment is long.
     RINGLET_INLINE Vec3<float> clear(Vec3<float> x, Vec3<float> t, Lanes<float> whole, Lanes<float> s) {
+        const Lanes<float> half = 0.5f * whole, start = bound_;
+        t = ended(x, t, whole, s);
+        const Lanes<float> higher = maximum<float>(start, bound_);
+        if (!any<float>((higher < float(field_.steepest) * half) & (whole > kShort))) return t;
+        return any<float>(lower_bound(field_, x + splat(0.5f) * t) < -kCurved) ? over(x, t, whole, s) : t;
+    }
+
+  private:
+    /// The segment whose end is outside.
+    RINGLET_INLINE Vec3<float> ended(Vec3<float> x, Vec3<float> t, Lanes<float> whole, Lanes<float> s) {
         // phi cannot fall faster than its steepest slope: most points need no sample
         const Lanes<float> keep = minimum<float>(splat(skin_), at_root_ + kRise * s);
         bound_ -= float(field_.steepest) * whole;
@@ -120,8 +131,31 @@ class Skin {
         return t;
     }
 
-  private:
+    /// The segment whose middle is outside too, as good as it can be.
+    __attribute__((noinline)) Vec3<float> over(Vec3<float> x, Vec3<float> t, Lanes<float> whole, Lanes<float> s) {
+        const Lanes<float> half = 0.5f * whole, keep = minimum<float>(at_root_ + kRise * (s - half), Lanes<float>{});
+        Mask<float> cut = whole > kShort;
+        for (int round = 0; round < kCareful; ++round) {
+            Lanes<float> phi;
+            Vec3<float> gradient;
+            sample<float>(field_, x + splat(0.5f) * t, phi, gradient);
+            cut &= phi < keep - kCurved;
+            if (!any<float>(cut)) break;
+            Vec3<float> lifted = tilted(t, whole, gradient, 2 * (keep - phi));
+            if (round == kCareful - 1) {
+                sample<float>(field_, x, phi, gradient);
+                lifted = (whole / (length(gradient) + 1e-12f)) * gradient;
+            }
+            const Lanes<float> others = bound_;
+            bound_ = cut ? splat(-1.0f) : splat(1.0f); // where all ends are looked at, and where none is
+            t = select(cut, ended(x, lifted, whole, s), t);
+            bound_ = cut ? bound_ : others;
+        }
+        return t;
+    }
+
     static constexpr float kRise = 0.25f;
+    static constexpr float kShort = 2e-3f;     // [m]: what is thinner than that is no ear
     static constexpr int kCareful = 4;         // rounds; one is exact over a plane. In folds of the skin, as behind an
     static constexpr int kRounds = 8;          // ear, what is nearest changes with each: who is not out then stands up
     static constexpr float kCurved = 0.1e-3f;  // [m]: from less depth one is exact over any head

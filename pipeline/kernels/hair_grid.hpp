@@ -24,9 +24,9 @@
 namespace ringlet {
 
 struct GridSettings {
-    double cell = 12e-3;    // [m] h
+    double cell = 14e-3;    // [m] h
     double density = 0.15;  // [kg/m^3] of the guides' own mass
-    double pressure = 0.05; // [m^2/s^2] k_p
+    double pressure = 0.03; // [m^2/s^2] k_p
     double drag = 3;        // [1/s] c_v
     double limit = 50;      // [m/s^2] largest push along an axis: p_max / h
     int hold = 1;           // steps from one look to the next

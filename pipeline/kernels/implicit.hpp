@@ -37,14 +37,14 @@ template <class Real> struct Drag {
 
 /// Elastic and tension forces and the load, over m0, P entries.
 template <class Real>
-void steady_forces(const Block<Real> &b, const StepSettings &settings, const Motion<Real> &from, Edges<Real> &edges,
-                   Vec3<Real> *f) {
+void steady_forces(const Block<Real> &b, const StepSettings &settings, const Motion<Real> &from, const Vec3<Real> *m,
+                   Edges<Real> &edges, Vec3<Real> *f) {
     edges.set(from.x, b.P);
     if (settings.torsion == Torsion::kirchhoff) {
-        add_rod(b, from.m, from.twist, edges);
+        add_rod(b, m, from.twist, edges);
     } else {
         add_bending(b, edges);
-        add_torsion(settings.torsion, b, from.m, edges);
+        add_torsion(settings.torsion, b, m, edges);
     }
     Vec3<Real> before{};
     for (int j = 0; j < b.P; ++j) {
@@ -62,7 +62,8 @@ template <class Real> struct Equation {
     const StepSettings &settings;
     const Contacts<Real> &contacts;
     const Edges<Real> &edges;
-    const Vec3<Real> *m; // directors, where the edges are
+    const Vec3<Real> *m;       // directors, where the edges are
+    const Joint<Real> *joints; // of them; only "kirchhoff" has any
     const Outside<Real> *outside = nullptr; // forces of other strands
 };
 
@@ -149,8 +150,7 @@ template <class Real, Torsion torsion> class Solver {
 
   public:
     Solver(Arena &arena, int P)
-        : terms_(arena.take<Begins>(P)), pivots_(arena.take<Pivots<Real, Unknowns, Reach>>(P)), window_(arena),
-          joints_(arena.take<Joint<Real>>(turns ? P : 0)) {}
+        : terms_(arena.take<Begins>(P)), pivots_(arena.take<Pivots<Real, Unknowns, Reach>>(P)), window_(arena) {}
 
     /// Solves for the velocities. `again`: as before but for the rows of contacts. To keep the terms for that costs a
     /// tenth of a solve, so they are kept only after a step that has solved again; else they are assembled again.
@@ -161,9 +161,6 @@ template <class Real, Torsion torsion> class Solver {
         const int first = std::max(b.first - 1, 0); // the edge before the first free point
         const Scale<Real> scale = stiffness_scale(eq);
         window_.clear();
-        if constexpr (turns)
-            for (int i = 1; i + 1 < b.P; ++i)
-                joints_[i] = Joint<Real>(eq.edges.d[i - 1], eq.edges.d[i], eq.m[i - 1], eq.m[i], eq.from.twist[i]);
         if constexpr (torsion == Torsion::rotor)
             if (b.clamped) add_root(eq, scale, to.spin[0] * eq.edges.il[0]);
         for (int i = 0; i < b.P; ++i) {
@@ -189,7 +186,6 @@ template <class Real, Torsion torsion> class Solver {
     bool keeps_ = false, solved_again_ = false;
     Pivots<Real, Unknowns, Reach> *pivots_;
     Window<Real, Unknowns, Reach> window_;
-    Joint<Real> *joints_;
 
     /// Eliminates the edge at point i, with the point's contact.
     RINGLET_INLINE void eliminate(const Equation<Real> &eq, int i, const Velocities<Real> &at, const Begins &terms) {
@@ -309,7 +305,7 @@ template <class Real, Torsion torsion> class Solver {
                                          L *F_theta, Begins &terms) {
         const Block<Real> &b = eq.b;
         if (i + 2 < b.P) {
-            const Joint<Real> q = joints_[i + 1];
+            const Joint<Real> q = eq.joints[i + 1];
             add_joint_gradient(Moments<Real>(b, i + 1, q), q, eq.edges, i + 1, F, F_theta);
             terms.derive(b, eq.edges, i + 1, q, scale);
             terms.look_back(eq.edges, i, scale, F, F_theta);

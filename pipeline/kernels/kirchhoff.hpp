@@ -30,14 +30,21 @@ template <class Real> inline constexpr Real kFold = sizeof(Real) == 4 ? Real(1e-
 template <class Real> inline constexpr Real kLeastTwisting = sizeof(Real) == 4 ? Real(1e-5) : Real(1e-9);
 inline constexpr double kLeastSpin = 1e-9;
 
-/// arctan(u) to 4e-16 for |u| <= tan(pi/8).
+/// arctan(u) to 4e-16, or 2e-8 in float32, for |u| <= tan(pi/8).
 template <class Real> RINGLET_INLINE Lanes<Real> arc_tangent(Lanes<Real> u) {
     const Lanes<Real> z = u * u;
-    Lanes<Real> sum = splat(Real(0.010755414220443175));
-    for (double c : {-0.034523517295154654, 0.053578965944593965, -0.065721909989094551, 0.076813917746464122,
-                     -0.090900955891864366, 0.11111072759544678, -0.14285713198350578, 0.1999999998327863,
-                     -0.33333333333222487, 0.99999999999999856})
-        sum = sum * z + Real(c);
+    Lanes<Real> sum;
+    if constexpr (sizeof(Real) == 4) {
+        sum = splat(Real(0.07986736483424821));
+        for (double c : {-0.13852088449070227, 0.19974470416206225, -0.33332799198938495, 0.9999999819952706})
+            sum = sum * z + Real(c);
+    } else {
+        sum = splat(Real(0.010755414220443175));
+        for (double c : {-0.034523517295154654, 0.053578965944593965, -0.065721909989094551, 0.076813917746464122,
+                         -0.090900955891864366, 0.11111072759544678, -0.14285713198350578, 0.1999999998327863,
+                         -0.33333333333222487, 0.99999999999999856})
+            sum = sum * z + Real(c);
+    }
     return u * sum;
 }
 
@@ -81,6 +88,16 @@ template <class Real> struct Joint {
         twist = half.angle + turn * turns;
         a1 = c * m0 + s * n0, a2 = c * n0 - s * m0;
         k1 = 2 * inverse * dot(a1, t1), k2 = 2 * inverse * dot(a2, t1);
+    }
+
+    /// The joint whose two directors turn by the angles 2 u and 2 v, of which c and s are cosine and sine of u + v and
+    /// `more` is 2 (v - u): the mid frame turns by their mean.
+    RINGLET_INLINE void turn(L c, L s, L more) {
+        const Vec3<Real> a = a1;
+        const L k = k1;
+        a1 = c * a + s * a2, a2 = c * a2 - s * a;
+        k1 = c * k + s * k2, k2 = c * k2 - s * k;
+        twist += more;
     }
 
     /// Curvature binormal k1 a2 - k2 a1.

@@ -167,14 +167,18 @@ template <class Real> class Stepper {
         }
         M failed = relax(head, from, to, block.theta * (dt * dt), wanted);
         finish(head, from, to, dt);
-        if (has_directors()) directors_.follow(block, edges_, start_, dt, from, to);
+        if (has_directors()) directors_.follow(block, edges_, dt, to);
         return failed;
     }
 
     /// Sets the edges that forces and stiffness are taken at; their directors.
     const Vec3<Real> *linearise(const Motion<Real> &from, Real dt) {
         edges_.follow(from.x, block.P);
-        if (settings_.is_explicit || settings_.look_ahead == 0) return from.m;
+        if (settings_.is_explicit || settings_.look_ahead == 0) {
+            if (!has_directors()) return from.m;
+            directors_.relax(block, edges_.d, from.m, from.twist, nullptr);
+            return directors_.m;
+        }
         return ahead_.look(block, from, u_, block.theta * dt, Real(settings_.look_ahead), has_directors(), directors_, edges_);
     }
 
@@ -197,7 +201,8 @@ template <class Real> class Stepper {
 
     /// Banded solve; rows that would pull are dropped and the system is solved again.
     void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
-        const Equation<Real> equation{block, from, interval, settings_, contacts, edges_, start_, outside};
+        const Equation<Real> equation{block,    from,   interval, settings_,        contacts,
+                                      edges_, start_, directors_.joints, outside};
         for (int again = 0;; ++again) {
             ++tally.solves;
             solvers_.solve(equation, again > 0, {u_, directors_.spin});
@@ -210,7 +215,7 @@ template <class Real> class Stepper {
     /// Symplectic Euler: no matrix, no tension, no rows; lengths and contacts are left to the rounds.
     void explicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
         const L dt = splat(Real(interval.dt));
-        steady_forces(block, settings_, from, edges_, f_);
+        steady_forces(block, settings_, from, start_, edges_, f_);
         for (int i = block.first; i < block.P; ++i) {
             Drag<Real> drag(block, from, i, settings_, interval.wind);
             Vec3<Real> v = from.v[i];

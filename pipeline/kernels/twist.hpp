@@ -1,11 +1,12 @@
 // Directors of "kirchhoff" strands: how they start, follow the points through a step, and find their twist.
 //
 // Notation as in kirchhoff.hpp: t_j tangent of segment j, m_j its director, theta_j a turn of it about t_j.
-// A step takes a director along by parallel transport in time (the smallest turn from the old tangent to the new one),
-// turns it as the solve predicts, and then takes one Newton step towards the quasi-static twist, dE/dtheta = 0 for every
-// free director: a tridiagonal system per strand. Its matrix is the exact one, but for the part g of bending in it,
-// which counts where it is positive:
+// A step begins with one Newton step towards the quasi-static twist, dE/dtheta = 0 for every free director: a tridiagonal
+// system per strand. Its matrix is the exact one, but for the part g of bending in it, which counts where it is positive:
 //     diagonal += (C + g) / dl at both segments of a joint, beside it (g - C) / dl
+// The joints that it works on, turned with their directors, are those that the solve is made of. At its end the step takes
+// directors along by parallel transport in time (the smallest turn from the old tangent to the new one) and turns them as
+// the solve predicts.
 // Source: Bergou et al., "Discrete elastic rods" (2008), sections 4.2 and 5 (quasi-static material frame);
 // "Discrete viscous threads" (2010), section 3 (parallel transport in time). We differ in taking one step, not
 // iterating: what is left over acts in the next time step (statics: test_an_equilibrium_is_one_for_every_dt).
@@ -16,7 +17,8 @@
 
 namespace ringlet {
 
-inline constexpr double kMostTurn = 0.8;       // [rad] of a director in one step, each of predictor and Newton step
+inline constexpr double kMostTurn = 1.2;       // [rad] that a step turns a director by, at most
+inline constexpr double kMostCorrection = 0.8; // [rad] that the Newton step turns it by, at most
 inline constexpr double kNoStiffness = 1e-25;  // [N m] far below any hair's, for strands without
 
 /// m turned as the tangent t turns into u on the shortest way.
@@ -47,16 +49,22 @@ template <class Real> RINGLET_INLINE Vec3<Real> squared(Vec3<Real> m, Vec3<Real>
     return select(~(mm > Real(1e-4)), some_director(t), unit);
 }
 
-/// m turned about t by the angle 2 arctan(u).
-template <class Real> RINGLET_INLINE Vec3<Real> turned(Vec3<Real> m, Vec3<Real> t, Lanes<Real> u) {
-    const Lanes<Real> uu = u * u, scale = reciprocal<Real>(1 + uu);
-    return ((1 - uu) * scale) * m + (2 * u * scale) * cross(t, m);
-}
+/// A turn of directors by the angle 2 arctan(u): c and s are cosine and sine of half of it.
+template <class Real> struct Turn {
+    Lanes<Real> u, c, s;
 
-/// Half of an angle, no larger than half the most that a director turns.
-template <class Real> RINGLET_INLINE Lanes<Real> half_turn(Lanes<Real> angle) {
-    const Lanes<Real> most = splat(Real(0.5 * kMostTurn));
-    return minimum<Real>(maximum<Real>(Real(0.5) * angle, -most), most);
+    explicit RINGLET_INLINE Turn(Lanes<Real> u) : u(u), c(inverse_root<Real>(1 + u * u)), s(u * c) {}
+
+    /// m turned about t.
+    RINGLET_INLINE Vec3<Real> operator()(Vec3<Real> m, Vec3<Real> t) const {
+        return (c * c - s * s) * m + (2 * s * c) * cross(t, m);
+    }
+};
+
+/// Half of an angle that is cut off at the most.
+template <class Real> RINGLET_INLINE Lanes<Real> half_turn(Lanes<Real> angle, double most) {
+    const Lanes<Real> half = splat(Real(0.5 * most));
+    return minimum<Real>(maximum<Real>(Real(0.5) * angle, -half), half);
 }
 
 /// Directors without twist along the points x (Bishop frame), P - 1 entries, from `some_director` at the root.
@@ -84,10 +92,12 @@ template <class Real> class Directors {
     using L = Lanes<Real>;
 
   public:
-    L *spin; // velocity of s = l theta: known for held directors, else from the solve
+    L *spin;             // velocity of s = l theta: known for held directors, else from the solve
+    Vec3<Real> *m;       // directors where the step is linearised
+    Joint<Real> *joints; // of these directors
 
     Directors(Arena &arena, int P)
-        : spin(arena.take<L>(P)), t_(arena.take<Vec3<Real>>(P)), joints_(arena.take<Joint<Real>>(P)) {
+        : spin(arena.take<L>(P)), m(arena.take<Vec3<Real>>(P)), joints(arena.take<Joint<Real>>(P)) {
         for (auto **array : {&inverse_, &upper_, &right_}) *array = arena.take<L>(P);
     }
 
@@ -111,44 +121,62 @@ template <class Real> class Directors {
         }
     }
 
-    /// Free directors at the end of the step, and the twist of all joints. `start` are the directors of the edges.
-    void follow(const Block<Real> &b, const Edges<Real> &edges, const Vec3<Real> *start, Real dt,
-                const Motion<Real> &from, Motion<Real> &to) {
+    /// Free directors at the end of the step, from those where it is linearised.
+    void follow(const Block<Real> &b, const Edges<Real> &edges, Real dt, Motion<Real> &to) {
         for (int j = 0; j < b.P - 1; ++j) {
             const Vec3<Real> edge = to.x[j + 1] - to.x[j], t = inverse_root<Real>(dot(edge, edge)) * edge;
-            const Vec3<Real> m = squared(transport(start[j], edges.d[j], t), t);
+            const Vec3<Real> moved = squared(transport(m[j], edges.d[j], t), t);
             const L ahead = edges.ahead ? edges.ahead_s[j] : L{};
-            to.m[j] = select(b.turns[j] > 0, turned(m, t, half_turn<Real>(edges.il[j] * (dt * spin[j] - ahead))), to.m[j]);
-            t_[j] = t;
-            to.twist[j] = from.twist[j];
+            const L half = half_turn<Real>(edges.il[j] * (dt * spin[j] - ahead), kMostTurn);
+            const Turn<Real> turn(half + (Real(1.0 / 3) * half) * (half * half)); // its tangent, to 2 % at most
+            to.m[j] = select(b.turns[j] > 0, turn(moved, t), to.m[j]);
+            if (j > 0) to.twist[j] = joints[j].twist;
         }
-        relax(b, t_, to.m, to.twist, nullptr);
     }
 
     /// The directors of lanes whose strand only moved on: they keep their directors.
     void carry(const Block<Real> &b, const Motion<Real> &from, Motion<Real> &to, Mask<Real> lanes) {
         for (int j = 0; j < b.P - 1; ++j) {
-            const Vec3<Real> edge = to.x[j + 1] - to.x[j];
-            t_[j] = inverse_root<Real>(dot(edge, edge)) * edge;
             to.m[j] = select(lanes & (b.turns[j] > 0), from.m[j], to.m[j]);
-            if (j == 0) continue;
-            const Joint<Real> q(t_[j - 1], t_[j], to.m[j - 1], to.m[j], from.twist[j]);
-            to.twist[j] = select<Real>(lanes, q.twist, to.twist[j]);
+            to.twist[j] = select<Real>(lanes, from.twist[j], to.twist[j]);
         }
     }
 
-    /// One Newton step of dE/dtheta = 0 for directors m at the tangents t; `twist` comes in as that before, and `by`,
-    /// unless null, tells how far directors have turned.
-    void relax(const Block<Real> &b, const Vec3<Real> *t, Vec3<Real> *m, L *twist, L *by) {
-        const L none = splat(Real(0)), one = splat(Real(1));
+    /// One Newton step of dE/dtheta = 0 for directors `given` at the tangents t: makes `m` and `joints` of them. The
+    /// twists are those nearest to `before`; `by`, unless null, tells how far directors have turned.
+    void relax(const Block<Real> &b, const Vec3<Real> *t, const Vec3<Real> *given, const L *before, L *by) {
         // Joints for themselves: each is a long chain of operations, and many of them go side by side
-        for (int i = 1; i < b.P - 1; ++i) joints_[i] = Joint<Real>(t[i - 1], t[i], m[i - 1], m[i], twist[i]);
+        for (int i = 1; i < b.P - 1; ++i) joints[i] = Joint<Real>(t[i - 1], t[i], given[i - 1], given[i], before[i]);
+        eliminate(b);
+        L after = splat(Real(0)), angle_after = after;
+        Turn<Real> turn_after(after);
+        for (int j = b.P - 2; j >= 0; --j) {
+            after = (right_[j] - upper_[j] * after) * inverse_[j];
+            const Turn<Real> turn(half_turn<Real>(after, kMostCorrection));
+            const L angle = 2 * arc_tangent<Real>(turn.u);
+            m[j] = turn(given[j], t[j]);
+            if (j + 1 < b.P - 1) {
+                const L both = turn.c * turn_after.c;
+                joints[j + 1].turn(both - turn.s * turn_after.s, turn.s * turn_after.c + turn.c * turn_after.s,
+                                   angle_after - angle);
+            }
+            if (by) by[j] = angle;
+            turn_after = turn, angle_after = angle;
+        }
+    }
+
+  private:
+    L *inverse_, *upper_, *right_; // of the eliminated tridiagonal matrix
+
+    /// Eliminates the Newton step's matrix from the root.
+    void eliminate(const Block<Real> &b) {
+        const L none = splat(Real(0)), one = splat(Real(1));
         L diagonal = none, force = none, coupling = none; // of segment j: from the joint before it
         for (int j = 0; j < b.P - 1; ++j) {
             L next_diagonal = none, next_force = none, next_coupling = none;
             if (j + 1 < b.P - 1) {
                 const int i = j + 1;
-                const Joint<Real> &q = joints_[i];
+                const Joint<Real> &q = joints[i];
                 const Moments<Real> at(b, i, q);
                 const L both = Real(0.5) * (at.M1 * q.k2 - at.M2 * q.k1), per_length = b.inverse_dl[i];
                 const L g = Real(0.25) * maximum<Real>(turning_stiffness(b, i, q), none);
@@ -157,7 +185,6 @@ template <class Real> class Directors {
                 next_force = -both - at.Q;
                 diagonal += next_diagonal;
                 force += at.Q - both;
-                twist[i] = q.twist;
             }
             const Mask<Real> turns = b.turns[j] > none;
             const L factor = j > 0 ? coupling * inverse_[j - 1] : none;
@@ -166,21 +193,7 @@ template <class Real> class Directors {
             inverse_[j] = reciprocal<Real>(pivot), right_[j] = value, upper_[j] = next_coupling;
             diagonal = next_diagonal, force = next_force, coupling = next_coupling;
         }
-        L after = none, turn_after = none;
-        for (int j = b.P - 2; j >= 0; --j) {
-            after = (right_[j] - upper_[j] * after) * inverse_[j];
-            const L half = half_turn<Real>(after), turn = 2 * arc_tangent<Real>(half);
-            m[j] = turned(m[j], t[j], half);
-            if (j + 1 < b.P - 1) twist[j + 1] += turn_after - turn;
-            if (by) by[j] = turn;
-            turn_after = turn;
-        }
     }
-
-  private:
-    Vec3<Real> *t_;
-    Joint<Real> *joints_;
-    L *inverse_, *upper_, *right_; // of the eliminated tridiagonal matrix
 };
 
 } // namespace ringlet

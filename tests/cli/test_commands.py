@@ -55,7 +55,7 @@ class Ringlet:
         """Reasons of the stages that are not fresh."""
         found = json.loads(self("status", "--json", *arguments)[0])
         for stage in found["stages"]:
-            assert set(stage) == {"name", "fresh", "reason"}
+            assert {"name", "fresh", "reason", "bytes", "seconds", "workers", "progress"} <= set(stage)
             assert stage["fresh"] == (stage["reason"] == "fresh")
         assert [stage["name"] for stage in found["stages"]] == ["groom", "simulate", "interpolate", "render"]
         return {stage["name"]: stage["reason"] for stage in found["stages"] if not stage["fresh"]}

@@ -76,6 +76,8 @@ def test_no_strand_that_follows_guides_comes_into_ears_or_shoulders(
         ear = (np.abs(place[:, 0]) > 0.07) & (np.abs(place[:, 1] + 0.01) < 0.04)
         regions = {"ears": ear, "shoulders": place[:, 1] < -0.14, "anywhere": np.ones(len(place), bool)}
         depth[name] = {region: -1e3 * float(phi[inside].min()) for region, inside in regions.items()}
+        middles = 0.5 * (points[:, 2:] + points[:, 1:-1]).reshape(-1, 3)
+        depth[name]["middles of segments"] = -1e3 * float(mannequin.field.distance(middles).min())
     lengths = [
         np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1) for x in (rest.astype(np.float64), points)
     ]

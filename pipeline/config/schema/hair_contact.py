@@ -13,9 +13,9 @@ class HairContact(Section):
     """How guides keep apart: "grid" (hair as a fluid; cheap), "capsule" (guides as soft rods that collide and rub) or "none"."""
     density: Annotated[Density, Field(gt=0)] = 10.0
     """Grid: hair that is denser pushes, counted with all strands of the groom; where the groom is denser, that counts."""
-    cell: Annotated[Length, Field(gt=0)] = 12e-3
-    """Grid: spacing of the grid, one and a half times the distance of the guides: in smaller cells their number is noise."""
-    pressure: Annotated[float, Field(ge=0)] = 0.05
+    cell: Annotated[Length, Field(gt=0)] = 14e-3
+    """Grid: spacing of the grid, about twice the distance of the guides: in smaller cells their number is noise."""
+    pressure: Annotated[float, Field(ge=0)] = 0.03
     """Grid: how hard hair of twice the density pushes [m^2/s^2]."""
     drag: Annotated[Rate, Field(ge=0)] = 3.0
     """Grid: the rate at which a guide takes on the velocity of the hair around it."""
