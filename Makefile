@@ -70,7 +70,7 @@ $(filter-out render movie sheet sweep,$(WANTED)): %: outputs/%
 endif
 
 .PHONY: render movie sheet turntable sweep
-render: $(if $(NAME),outputs/$(NAME)) ## frames of CONFIG (configs/default.toml): make render CONFIG=configs/curly.toml
+render: $(if $(NAME),outputs/$(NAME)) ## frames of CONFIG, by WORKERS processes if set: make render CONFIG=configs/curly.toml
 
 movie: render ## the frames of CONFIG as one movie
 	@$(RINGLET) movie $(CONFIG)
@@ -81,7 +81,7 @@ sheet: render ## the frames of CONFIG on one page
 turntable: $(ENV) $(KERNELS) ## once around the hair of CONFIG at rest, as a movie: outputs/<name>-turntable
 	@$(RINGLET) turntable $(CONFIG)
 
-sweep: $(if $(NAME),outputs/$(NAME)/sweep) ## all experiments of CONFIG's [sweep], on WORKERS processes if set
+sweep: $(if $(NAME),outputs/$(NAME)/sweep) ## all experiments of CONFIG's [sweep], by WORKERS processes if set
 
 # --- Checks --------------------------------------------------------------------------------------
 

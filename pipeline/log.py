@@ -124,7 +124,9 @@ def records(path: Path) -> Iterator[Record]:
             continue
         for line in file.read_text(encoding="utf-8", errors="replace").splitlines():
             with suppress(ValueError):
-                yield json.loads(line)
+                record = json.loads(line)
+                if isinstance(record, dict):
+                    yield record
 
 
 def peak_gb() -> float:

@@ -110,13 +110,19 @@ class Batch:
         log.emit(stage, "end", f"made in {seconds} s", key=key, seconds=seconds, peak_gb=peak)
 
     def seconds(self, stage: str) -> float | None:
-        """How long a stage has taken that is there; of the render all runs under its key, where the log tells of them."""
-        if stage != "render":
-            with cache.open(self.file(stage), _KINDS[stage]) as reader:
-                return float(reader.provenance["wall_time_s"])
+        """How long it took to make a stage that is there, of the render all runs under its key.
+
+        What the log tells; where it does not, how long the file was being written, None for frames.
+        """
         records = [r for r in log.records(self.experiment.log) if r.get("key") == self.keys[stage]]
-        spent = [record["seconds"] for record in records if record["event"] == "end"]
-        return round(sum(spent), 3) if spent else None
+        ends = [record.get("seconds") for record in records if record.get("event") == "end"]
+        spent = [seconds for seconds in ends if isinstance(seconds, int | float)]
+        if spent:
+            return round(float(sum(spent) if stage == "render" else spent[-1]), 3)
+        if stage == "render":
+            return None
+        with cache.open(self.file(stage), _KINDS[stage]) as reader:
+            return float(reader.provenance["wall_time_s"])
 
     def execute(self, stage: str, frames: tuple[int, ...]) -> None:
         """Run the code of a stage; of the render, for these frames."""

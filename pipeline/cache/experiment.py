@@ -45,6 +45,11 @@ class Experiment:
         """Where files are written."""
         return self.folder, self.frames, self.guides.with_suffix(".segments")
 
+    @property
+    def report(self) -> Path:
+        """The page that tells about its last run."""
+        return self.folder / "report.html"
+
     def files(self, stage: str) -> tuple[Path, ...]:
         """The file of a stage before the render, then those that go with it."""
         return {

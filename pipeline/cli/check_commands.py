@@ -167,13 +167,37 @@ def bench_render(
     size: Annotated[str, Parameter(help="Width x height [px].")] = "1920x1080",
     geometry: Literal["auto", "coverage", "tubes", "ribbons", "lines"] = "auto",
     samples: Annotated[int, Parameter(help="N for N x N supersampling.")] = 2,
+    threads: Annotated[int, Parameter(help="0 for all processors.")] = 0,
+    chunk: Annotated[int, Parameter(help="Strands in flight at once.")] = 65_536,
+    frames: Annotated[int, Parameter(help="How many are timed, after a first one.")] = 4,
     json: Json = False,
 ) -> None:
-    """One frame: seconds and memory."""
+    """Frames in a row: seconds for each, memory, and a digest that neither threads nor chunks change."""
     from pipeline.bench.render import bench
 
-    found = bench(strands=strands, points=points, size=_size(size), geometry=geometry, samples=samples)
+    found = bench(
+        strands, points, _size(size), geometry, samples, threads=threads, chunk=chunk, frames=frames
+    )
     _report(found, json)
+
+
+@bench.command(name="render-table")
+def bench_render_table(
+    *,
+    strands: Annotated[int, Parameter(help="The most.")] = 1_000_000,
+    config: Annotated[Path | None, Parameter(help="Time all stages of this config as well.")] = None,
+    json: Json = False,
+) -> int:
+    """How frames grow with strands, and that threads and chunks change none; exit code 1 where they do."""
+    from pipeline.bench.render_table import table
+
+    found = table(config, strands)
+    if json:
+        print_json(found)
+    else:
+        _table(found["rows"], tuple(found["rows"][0]))
+        _report({name: found[name] for name in ("exponent", "equal")}, json)
+    return 0 if found["equal"] else 1
 
 
 @app.command(group=CHECK_GROUP)

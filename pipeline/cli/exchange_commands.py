@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import App, Parameter
 
 from pipeline.cli.base import (
     EXCHANGE_GROUP,
@@ -80,8 +80,40 @@ def _convert(found: "Inspected", to: Path) -> None:
     write_still(to, found.evenly(), width(found.kept) or drawn_width(Render(), len(found.kept)))
 
 
-@app.command(group=EXCHANGE_GROUP, sort_key=2)
-def export(
+export = App(name="export", help_format="plaintext", group=EXCHANGE_GROUP, sort_key=2)
+app.command(export)
+
+
+@export.command(name="openjd")
+def export_openjd(
+    config: ConfigFile,
+    *,
+    to: Annotated[
+        Path | None,
+        Parameter(
+            show_default=False,
+            help="A file above config and outputs, or both are to be given with the job; <name>.openjd.json.",
+        ),
+    ] = None,
+    settings: Settings = (),
+    outputs: Outputs = OUTPUTS,
+) -> None:
+    """Write a run as a job template of Open Job Description, which render farms read."""
+    import json
+
+    from pipeline.cache import replacing
+    from pipeline.farm.openjd import template
+
+    loaded = load_config(config, settings)
+    path = to or Path(f"{loaded.config.name}.openjd.json")
+    job = template(loaded.config, config, outputs, path.parent, settings)
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(job, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    print(path)
+
+
+@export.default
+def export_strands(
     config: ConfigFile,
     *,
     kind: Annotated[

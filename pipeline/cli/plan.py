@@ -40,7 +40,7 @@ _RENDER_B_PER_SAMPLE = 60
 _RENDER_B_PER_SEGMENT = 14  # of strands that may be seen, sorted into tiles
 _BOUND_B = 70  # of a strand's binding in memory, and its order
 _IN_FLIGHT = 65_536  # strands: the renderer's chunk
-_KEPT_B = 256 << 20  # points that the renderer keeps between its two passes
+_KEPT_B = 200 << 20  # points that the renderer keeps between its two passes
 _PNG_B_PER_PIXEL = 0.5
 
 

@@ -162,6 +162,7 @@ def _make(
 ) -> None:
     """Make a stage and whatever it needs; `everything` also makes the stages before it that it does not need."""
     from pipeline.cli.machine import refuse_bare_start
+    from pipeline.cli.report_commands import write_report
 
     log.use(manner.log_format)
     refuse_bare_start()  # before anything large is loaded
@@ -176,7 +177,7 @@ def _make(
     before = STAGES[: STAGES.index(stage)] if everything else NEEDS[stage]
     with log.kept_in(batch.experiment.log):
         if not manner.force:
-            _refuse_what_does_not_fit(batch, (*before, stage), wanted)
+            refuse_what_does_not_fit(batch, (*before, stage), where, wanted)
         if not where.here:
             from pipeline.farm.run import make
 
@@ -184,16 +185,26 @@ def _make(
         for name in before:
             batch.make(name, touch=everything)
         batch.make(stage, wanted if stage == "render" else None)
+        if stage == "render" and wanted is None:
+            write_report(loaded, batch.experiment)
 
 
-def _refuse_what_does_not_fit(batch: "Batch", stages: Sequence[str], frames: range | None) -> None:
-    """Refuse, before anything runs, when a stage that has to be made is planned to need more memory than is free."""
+def refuse_what_does_not_fit(
+    batch: "Batch", stages: Sequence[str], where: Where = HERE, frames: range | None = None
+) -> None:
+    """Refuse, before anything runs, when a stage that has to be made is planned to need more memory than is free.
+
+    Workers of this machine render side by side; what those of a scheduler have, only they know.
+    """
+    if where.scheduler:
+        return
     from pipeline.cli.machine import shortage
     from pipeline.cli.plan import estimate
 
     costs = estimate(batch.config)["stages"]
     for stage in stages:
-        short = shortage(stage, costs[stage]["peak_rss_gb"])
+        processes = (where.workers or 1) if stage == "render" else 1
+        short = shortage(stage, processes * costs[stage]["peak_rss_gb"])
         if short and not batch.state(stage, frames).fresh:
             raise InputError(f"ringlet: {short}")
 

@@ -30,15 +30,15 @@ equals := =
 {strands}: {groom} {keys}/interpolate.key
 	@$(RINGLET) interpolate {config}
 
-{frames} &: {guides} {strands} {keys}/render.key
-	@$(RINGLET) render {config}
+{frames} {report} &: {guides} {strands} {keys}/render.key
+	@$(RINGLET) render {config} $(if $(WORKERS),--workers $(WORKERS))
 
-{folder}: {frames}
+{folder}: {frames} {report}
 
 .PHONY: {folder}/sweep
 {sweep}
 # Every file appears whole, so nothing has to be thrown away when another one fails.
-.PRECIOUS: {groom} {guides} {strands} {frames}
+.PRECIOUS: {groom} {guides} {strands} {frames} {report}
 """
 
 _SWEEP = """\
@@ -79,12 +79,15 @@ def write_stamps(config: Path, loaded: Loaded, experiment: Experiment) -> None:
         groom=_escaped(experiment.groom),
         guides=_escaped(experiment.guides),
         strands=_escaped(experiment.strands),
+        report=_escaped(experiment.report),
         frames=_listed(batch.outputs("render")),
         sweep=(_SWEEP if batches else _NO_SWEEP).format(
             config=_escaped(config),
             folder=_escaped(experiment.folder),
             stamp=_escaped(_stamp(experiment, "sweep")),
-            products=_listed([*products, *(experiment.folder / f"sweep.{kind}" for kind in ("json", "csv"))]),
+            products=_listed(
+                [*products, *(experiment.folder / f"sweep.{kind}" for kind in ("json", "csv", "html"))]
+            ),
         ),
     )
     _write(experiment.folder / "targets.mk", rules)

@@ -42,7 +42,10 @@ def sweep(
     from pipeline.batch.sweep import batch_of, chosen, make_all
     from pipeline.batch.table import write_table
     from pipeline.cache import Experiment
+    from pipeline.cli.run_commands import refuse_what_does_not_fit
+    from pipeline.config import STAGES
     from pipeline.config.sweep import load_sweep
+    from pipeline.report import write_sweep_page
 
     log.use(manner.log_format)
     swept = load_sweep(config, settings)
@@ -52,6 +55,9 @@ def sweep(
         return
     with log.kept_in(Experiment(outputs / swept.base.config.name).log):
         batches = [batch_of(run, outputs) for run in runs]
+        if not manner.force:
+            for batch in batches:
+                refuse_what_does_not_fit(batch, STAGES, where)
         try:
             if not where.here:
                 from pipeline.farm.run import make
@@ -59,5 +65,6 @@ def sweep(
                 make(batches, where.workers, where.scheduler)
             make_all(batches)
         finally:
-            path = write_table(swept, outputs, config)
-    print(path)
+            table = write_table(swept, outputs, config)
+        page = write_sweep_page(table)
+    print(table, page, sep="\n")

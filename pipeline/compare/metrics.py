@@ -33,7 +33,7 @@ class Metrics:
 
 
 def measure(reference: Picture, picture: Picture) -> Metrics:
-    """Compare two pictures (H, W, 3) of one size, both uint8 sRGB or both float32 linear.
+    """Compare two pictures (H, W, 3) of one size, both uint8 or uint16 sRGB, or both float32 linear.
 
     Linear ones are compared by FLIP for high dynamic range and, for the rest, as a screen shows them. Raises
     InputError when sizes or types differ or the optional packages of the extra `compare` are missing.
@@ -41,7 +41,9 @@ def measure(reference: Picture, picture: Picture) -> Metrics:
     if reference.shape != picture.shape:
         raise InputError(f"pictures differ in size: {_size(reference)} and {_size(picture)}")
     if reference.dtype != picture.dtype:
-        raise InputError("pictures differ in kind: one is linear (EXR), the other one is not")
+        raise InputError(
+            f"pictures differ in kind: {reference.dtype} and {picture.dtype} a channel; linear ones are float32"
+        )
     changed = float(_differs(reference, picture).mean())
     if changed == 0:
         return Metrics(changed=0.0, flip=0.0, ssim=1.0, blurred=0.0, luminance=0.0)
@@ -65,7 +67,7 @@ def flip_map(reference: Picture, picture: Picture) -> NDArray[np.float32]:
         import flip_evaluator
     except ImportError as error:
         raise _missing("flip-evaluator") from error
-    linear = reference.dtype != np.uint8
+    linear = reference.dtype == np.float32
     pair = [np.ascontiguousarray(finite(each) if linear else encoded(each)) for each in (reference, picture)]
     errors, _, _ = flip_evaluator.evaluate(
         *pair, "HDR" if linear else "LDR", applyMagma=False, computeMeanError=False

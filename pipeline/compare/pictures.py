@@ -1,14 +1,16 @@
-"""Pictures in memory: (H, W, 3), uint8 sRGB from PNG and the like, float32 linear from OpenEXR."""
+"""Pictures in memory: (H, W, 3), uint8 or uint16 sRGB from PNG and the like, float32 linear from OpenEXR."""
 
+import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.compare.deep import load_deep
 from pipeline.errors import InputError
 
-Picture = NDArray[np.uint8] | NDArray[np.float32]
+Picture = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
 Display = NDArray[np.uint8]
 
 ENDINGS = (".png", ".exr")  # what folders are searched for
@@ -26,6 +28,9 @@ def load_picture(path: Path) -> Picture:
     from PIL import Image, UnidentifiedImageError
 
     try:
+        deep = load_deep(path)
+        if deep is not None:
+            return deep
         with Image.open(path) as image:
             if not image.has_transparency_data:
                 return np.asarray(image.convert("RGB"))
@@ -33,7 +38,14 @@ def load_picture(path: Path) -> Picture:
             return np.asarray(
                 Image.alpha_composite(Image.new("RGBA", over.size, _BEHIND), over).convert("RGB")
             )
-    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
+    except (
+        UnidentifiedImageError,
+        Image.DecompressionBombError,
+        OSError,
+        SyntaxError,
+        ValueError,
+        zlib.error,
+    ) as error:
         raise InputError(f"{path}: not a readable picture ({error})") from error
 
 
@@ -61,8 +73,9 @@ def displayed(picture: Picture) -> Display:
 
 def encoded(picture: Picture) -> NDArray[np.float32]:
     """Values in 0..1 as sRGB encodes them, (H, W, 3) float32; what is not a number is black."""
-    if picture.dtype == np.uint8:
-        return np.ascontiguousarray(picture, np.float32) / np.float32(255)
+    if picture.dtype != np.float32:
+        largest = np.float32(65535 if picture.dtype == np.uint16 else 255)
+        return np.asarray(np.ascontiguousarray(picture, np.float32) / largest, np.float32)
     linear = np.clip(finite(picture), 0, 1)
     curve = 1.055 * np.power(np.maximum(linear, 0.0031308), 1 / 2.4) - 0.055
     return np.asarray(np.where(linear <= 0.0031308, 12.92 * linear, curve), np.float32)

@@ -26,6 +26,21 @@ def resolved(loaded: Loaded) -> dict[str, tuple[Any, str]]:
     return values
 
 
+def differing(loaded: Loaded) -> dict[str, tuple[Any, Any, str]]:
+    """Map each key that somebody set to another value than the schema's default to its value, the default and its origin.
+
+    The default is None where there is none, as in tables that the config names itself.
+    """
+    defaults: dict[str, tuple[Any, str]] = {}
+    _collect(Config(name=loaded.config.name).model_dump(mode="json"), "", {}, defaults)
+    unset = (None, "")
+    return {
+        key: (value, defaults.get(key, unset)[0], origin)
+        for key, (value, origin) in resolved(loaded).items()
+        if origin != "default" and (key not in defaults or value != defaults[key][0])
+    }
+
+
 def _collect(value: Any, key: str, origins: dict[str, str], out: dict[str, tuple[Any, str]]) -> None:
     if isinstance(value, dict):
         for name, inner in value.items():

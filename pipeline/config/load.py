@@ -14,10 +14,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.config.complaints import complaints
+from pipeline.config.roots import LONGEST, require_within, roots_of
 from pipeline.config.schema import PRESETS, Config
 from pipeline.config.sequence import numbered_files
 from pipeline.config.toml_lines import key_lines
 from pipeline.config.tree import KeyPath, Tree, dotted, parse_key
+from pipeline.config.usd_layers import layers_of
 from pipeline.errors import InputError
 
 FILES: dict[
@@ -61,7 +63,7 @@ def load(path: Path, overrides: tuple[str, ...] = ()) -> Loaded:
 def read_tree(path: Path, overrides: tuple[str, ...]) -> tuple[Tree, tuple[Path, ...]]:
     """The values of a config file, of what it extends and of overrides, not yet validated; and the files read."""
     files: list[Path] = []
-    tree = _read(path, files)
+    tree = _read(path, files, roots_of(path))
     for override in overrides:
         _override(tree, override)
     return tree, tuple(files)
@@ -88,9 +90,10 @@ def set_value(tree: Tree, path: KeyPath, value: Any, origin: str, folder: Path) 
 
 
 def named_files(config: Config) -> dict[tuple[str, ...], tuple[Path, ...]]:
-    """The files that a config names, by key. Raises InputError for a sequence with gaps."""
+    """The files that a config names, by key, and the layers that those of OpenUSD name. Raises InputError for a sequence with gaps."""
     values = config.model_dump(mode="json")
-    files = {key: (Path(value),) for key, value in _naming(values, FILES).items() if value not in _words(key)}
+    alone = {key: Path(value) for key, value in _naming(values, FILES).items() if value not in _words(key)}
+    files = {key: (path, *layers_of(path)) for key, path in alone.items()}
     sequences = {key: numbered_files(Path(value)) for key, value in _naming(values, SEQUENCES).items()}
     return files | sequences
 
@@ -117,7 +120,7 @@ def _words(key: KeyPath) -> tuple[str, ...]:
     return FILES.get(tuple(map(str, key)), ())
 
 
-def _read(path: Path, files: list[Path]) -> Tree:
+def _read(path: Path, files: list[Path], roots: tuple[Path, ...]) -> Tree:
     if path.resolve() in (file.resolve() for file in files):
         chain = " -> ".join(str(file) for file in [*files, path])
         raise InputError(f"{files[-1]}: extends: goes round in circles: {chain}")
@@ -140,9 +143,12 @@ def _read(path: Path, files: list[Path]) -> Tree:
     if not isinstance(parent, str):
         raise InputError(f'{where}: expected the name of a config, such as "default.toml"')
     parent = Path(os.path.normpath(path.parent / parent))
+    require_within(where, parent, roots)
     if not parent.is_file():
         raise InputError(f"{where}: no such file: {parent}{_similar(parent)}")
-    tree = _read(parent, files)
+    if len(files) == LONGEST:
+        raise InputError(f"{where}: {LONGEST} configs extend one another; no more are read")
+    tree = _read(parent, files, roots)
     tree.update(own)
     return tree
 

@@ -42,15 +42,18 @@ def environment(threads: int) -> dict[str, str]:
 
 
 @contextmanager
-def local_cluster(workers: int) -> Iterator[str]:
-    """Start a scheduler and workers on this machine, which share its processors; lends the scheduler's address."""
+def local_cluster(workers: int, threads: int | None = None) -> Iterator[str]:
+    """Start a scheduler and workers on this machine; lends the scheduler's address.
+
+    They share the processors, unless the threads of each are given.
+    """
     need_distributed()
     import dask
     from distributed import LocalCluster
 
     if workers < 1:
         raise InputError(f"--workers {workers}: expected a number above 0")
-    threads = max(1, processors() // workers)
+    threads = threads or max(1, processors() // workers)
     settings = {
         "distributed.scheduler.allowed-failures": ATTEMPTS,
         "distributed.nanny.pre-spawn-environ": environment(threads),
@@ -77,6 +80,7 @@ def connected(address: str) -> Iterator["Client"]:
     need_distributed()
     from distributed import Client
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it tells, we tell in one line
     try:
         client = Client(address, timeout=_CONNECT_S, set_as_default=False)
     except ValueError as error:

@@ -48,6 +48,8 @@ class Report:
         """Count the outcome of one task."""
         self.made += outcome.made
         self.seconds += outcome.seconds
+        if outcome.fault:
+            raise RuntimeError(f"on a worker:\n{outcome.fault}")
         if outcome.error:
             self.errors.setdefault(name, outcome.error)
         else:

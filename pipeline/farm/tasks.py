@@ -4,6 +4,7 @@ import os
 import socket
 import threading
 import time
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +15,7 @@ from pipeline import kernels, log
 from pipeline.batch.stages import NEEDS, Batch
 from pipeline.cache import Experiment
 from pipeline.config import Config
-from pipeline.errors import InputError
+from pipeline.errors import FAULT, InputError, verdict
 
 TOPIC = "ringlet"
 THREADS = "RINGLET_THREADS"  # environment variable: how many threads the kernels of a worker have
@@ -63,7 +64,9 @@ class Outcome:
     made: int = 0
     """Frames that were not fresh."""
     error: str = ""
-    """What the user has to mend; later tasks pass it on."""
+    """What went wrong, mostly for the user to mend; later tasks pass it on."""
+    fault: str = ""
+    """Where, if it is a fault of ringlet."""
 
 
 def make_stage(job: Job, stage: str, after: Sequence[Outcome]) -> Outcome:
@@ -92,18 +95,19 @@ def _render(job: Job, frames: range) -> int:
 
 
 def _guarded(job: Job, after: Sequence[Outcome], work: Callable[[], int]) -> Outcome:
-    """Do the work, unless something before it failed; errors of the user come back as text."""
+    """Do the work, unless something before it failed; errors come back as text, which every process can read."""
     failed = next((outcome for outcome in after if outcome.error), None)
     if failed is not None:
-        return Outcome(error=failed.error)
-    start, made, error = time.monotonic(), 0, ""
+        return Outcome(error=failed.error, fault=failed.fault)
+    start, made, error, fault = time.monotonic(), 0, "", ""
     with _one_at_a_time, log.forwarded_to(partial(_tell, job.folder)):
         kernels.set_threads(_threads())
         try:
             made = work()
-        except InputError as wrong:
-            error = str(wrong)
-    return Outcome(time.monotonic() - start, socket.gethostname(), kernels.VARIANT, made, error)
+        except Exception as wrong:  # noqa: BLE001, told where the run was started
+            code, error = verdict(wrong)
+            fault = traceback.format_exc() if code == FAULT else ""
+    return Outcome(time.monotonic() - start, socket.gethostname(), kernels.VARIANT, made, error, fault)
 
 
 def _threads() -> int:

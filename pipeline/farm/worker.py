@@ -50,6 +50,8 @@ def serve(address: str, threads: int | None, patience: float) -> None:
 async def _serve(address: str, threads: int) -> None:
     from distributed import Nanny
 
-    async with Nanny(address, nthreads=1, memory_limit=0, dashboard=False) as nanny:
+    async with Nanny(
+        address, nthreads=1, memory_limit=0, dashboard=False, silence_logs=logging.CRITICAL
+    ) as nanny:
         say("worker", f"working for {address} with {threads} thread{'' if threads == 1 else 's'}")
         await nanny.finished()

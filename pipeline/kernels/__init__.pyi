@@ -600,7 +600,7 @@ def expand(
 _F32 = NDArray[np.float32]
 
 class DensityGrid:
-    """Drawn hair in voxels: one integer count for each light and one without direction.
+    """Drawn hair in voxels: one integer count for each direction and one without.
 
     Integers add in any order, so that the sums depend neither on threads nor on how strands are cut into chunks.
     """
@@ -615,7 +615,7 @@ class DensityGrid:
             origin: (3,) float64 [m], outer corner of the first voxel.
             spacing: [m], side of a voxel.
             width: [m], a typical drawn width; the counts are multiples of spacing * width / 4096.
-            directions: (L, 3) float32, unit vectors towards the lights.
+            directions: (L, 3) float32 unit vectors.
 
         """
 
@@ -675,6 +675,59 @@ def surroundings(hair: _F32, body: _F32, spacing: float, loss: _F32, directions:
 
     """
 
+class Shadows:
+    """Hair and head as each light sees them: layers of strands under the surface that the light meets first (shadow_map.hpp).
+
+    Sums are integers: they depend neither on threads nor on how strands are cut into chunks.
+    """
+
+    def __init__(
+        self, directions: _F32, lower: _F64, upper: _F64, spacing: float, width: float, share: float = 1.0
+    ) -> None:
+        """Empty maps.
+
+        Args:
+            directions: (L, 3) float32, unit vectors towards the lights.
+            lower: (3,) float64 [m], bounds of all strands; what lies outside casts no shadow.
+            upper: (3,) float64 [m].
+            spacing: [m], between the nodes of a map; the bounds are at most 2000 of it.
+            width: [m], a typical drawn width.
+            share: the part of all strands that is added, as much wider, to cast the shadows of all.
+
+        """
+
+    def add(self, points: _F32, widths: _F32) -> None:
+        """Keeps strands until `finish`: points (S, P, 3) float32 [m], widths (S, P) float32 [m]; P is always the same."""
+
+    def finish(
+        self, depth: _F32, origin: _F64, spacing: float, field: DistanceField | None, pose: _F64
+    ) -> None:
+        """Makes the maps.
+
+        Args:
+            depth: (L, nx, ny, nz) float32, strands towards each light on the density grid: deep in the hair less care is taken.
+            origin: (3,) float64 [m], outer corner of its first voxel.
+            spacing: [m], of its voxels.
+            field: the head in its rest frame.
+            pose: (4, 4) float64, rest -> world.
+
+        """
+
+    def map(self, light: int) -> tuple[_F32, _F32, _F32]:
+        """A finished map itself, not a copy, on (nu, nv) nodes.
+
+        Returns:
+            (nu, nv, 2): distance [m] of the first strand from the map's beginning, and strands there are in all;
+            (nu, nv, 32): strands up to each layer; (nu, nv): distance [m] of the head.
+
+        """
+
+    def reach(self, light: int, points: _F32, own: float = 0.0) -> _F32:
+        """(N, 3) float32 at points (N, 3) float32 [m]: strands towards the light and behind, and what the head lets pass.
+
+        With `own` 1 the strand that each point lies on is not counted.
+        """
+
 class FibreTables:
     """Scattering of one fibre, tabulated; see `pipeline.render.fibre`."""
 
@@ -692,23 +745,23 @@ class FibreTables:
         """
 
 class Illumination:
-    """Lights and sky, and what of them reaches each voxel."""
+    """Lights and sky, and what of them reaches where."""
 
     def __init__(
         self,
         directions: _F32,
         irradiance: _F32,
         sky: _F32,
-        depths: tuple[_F32, _F32, _F32],
+        shadows: Shadows,
         surroundings: _F32,
     ) -> None:
-        """Lights, and the depths in the memory order that shading reads; the depths are copied, the rest is held.
+        """Lights with their shadows; all is held and not copied.
 
         Args:
             directions: (L, 3) float32 unit vectors towards the lights.
             irradiance: (L, 3) float32 [W/m^2], R, G, B on a surface that faces the light.
             sky: (3,) float32, radiance of the constant sky.
-            depths: each (L, nx, ny, nz) float32: fibres towards the light, fibres away from it, body towards it.
+            shadows: finished, of the same directions.
             surroundings: (nx/2, ny/2, nz/2, 8) float32, see `surroundings`.
 
         """

@@ -6,18 +6,17 @@
 
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/shared_ptr.h>
 
 #include <cmath>
 #include <optional>
-#include <tuple>
+#include <memory>
 
 namespace ringlet {
 
 using Triples = Array<const float, -1, 3>;
 using Triple = Array<const float, 3>;
 using Point = Array<const double, 3>;
-using Depths = Array<const float, -1, -1, -1, -1>;
 using Records = Array<const float, -1, -1, -1, 8>;
 using Strands = Array<const float, -1, -1, 3>;
 using Radiance = nb::ndarray<nb::numpy, float>;
@@ -51,29 +50,23 @@ struct HeldLight : Illumination {
     Triples direction_array, irradiance_array;
     Triple sky_array;
     Records surrounding_array;
+    std::shared_ptr<Shadows> held_shadows;
 };
 
-static void make_light(HeldLight *held, Triples directions, Triples irradiance, Triple sky,
-                       std::tuple<Depths, Depths, Depths> depths, Records surroundings) {
-    const Depths separate[3] = {std::get<0>(depths), std::get<1>(depths), std::get<2>(depths)};
+static void make_light(HeldLight *held, Triples directions, Triples irradiance, Triple sky, std::shared_ptr<Shadows> shadows,
+                       Records surroundings) {
     Illumination light{};
     light.lights = int(directions.shape(0));
     require(irradiance.shape(0) == directions.shape(0), "Illumination: irradiance does not fit directions");
-    for (const Depths &depth : separate) {
-        require(depth.shape(0) == directions.shape(0), "Illumination: depths do not fit directions");
-        for (int axis = 1; axis < 4; ++axis)
-            require(depth.shape(axis) == separate[0].shape(axis), "Illumination: depths differ in shape");
-    }
+    require(shadows->maps.size() == directions.shape(0), "Illumination: shadows do not fit directions");
+    for (const ShadowMap &map : shadows->maps) require(!map.layers.empty(), "Illumination: finish the shadows first");
     for (int axis = 0; axis < 3; ++axis) {
-        light.n[axis] = int(separate[0].shape(axis + 1));
-        require(light.n[axis] >= 4 && size_t(light.n[axis] / 2) == surroundings.shape(axis),
-                "Illumination: surroundings are not half of depths");
+        light.n[axis] = 2 * int(surroundings.shape(axis));
+        require(light.n[axis] >= 4, "Illumination: expected 2 or more surroundings along each axis");
     }
-    require(separate[0].size() < size_t(1) << 29, "Illumination: expected fewer than 2^29 voxels for all lights together");
     light.directions = directions.data(), light.irradiance = irradiance.data(), light.sky = sky.data();
-    light.surroundings = surroundings.data();
-    for (Depth kind : {towards, away, body}) light.interleave(kind, separate[kind].data(), threads());
-    new (held) HeldLight{std::move(light), directions, irradiance, sky, surroundings};
+    light.surroundings = surroundings.data(), light.shadows = shadows.get();
+    new (held) HeldLight{light, directions, irradiance, sky, surroundings, shadows};
 }
 
 static Radiance shade_strands(Strands points, Triples absorption, Array<const uint32_t, -1> key, Point eye,
@@ -124,7 +117,7 @@ void bind_shade(nb::module_ &m) {
         .def("__init__", &make_tables, nb::arg("lobes"), nb::arg("sums"), nb::arg("variance"), nb::arg("tilt"),
              nb::arg("absorption_max"));
     nb::class_<HeldLight>(m, "Illumination")
-        .def("__init__", &make_light, nb::arg("directions"), nb::arg("irradiance"), nb::arg("sky"), nb::arg("depths"),
+        .def("__init__", &make_light, nb::arg("directions"), nb::arg("irradiance"), nb::arg("sky"), nb::arg("shadows"),
              nb::arg("surroundings"))
         .def_rw("origin", &HeldLight::origin)
         .def_rw("spacing", &HeldLight::spacing)

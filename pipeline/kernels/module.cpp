@@ -26,6 +26,7 @@ static void set_threads(int count) {
 }
 
 void bind_density(nb::module_ &m);
+void bind_shadow(nb::module_ &m);
 void bind_develop(nb::module_ &m);
 void bind_drive(nb::module_ &m);
 void bind_energy(nb::module_ &m);
@@ -52,6 +53,7 @@ NB_MODULE(RINGLET_MODULE, m) {
           "Threads of every kernel from now on; 0 is all processors. No result depends on it.");
     m.def("threads", &ringlet::threads, "Threads that kernels use.");
     ringlet::bind_density(m);
+    ringlet::bind_shadow(m);
     ringlet::bind_develop(m);
     ringlet::bind_drive(m);
     ringlet::bind_energy(m);

@@ -33,11 +33,11 @@ struct StrandPoints {
 
 /// 16 points of strands, and what does not depend on the light.
 struct FibrePoints {
-    Vec3<float> x, tangent, to_eye; // x in voxels
+    Vec3<float> x, at, tangent, to_eye; // x in voxels; at [m] from the middle of the shadow maps
     Floats sine, cosine, theta;     // of theta_o
     Floats level[3];                // absorption in entries of the tables
     Floats albedo[3];               // a_f + a_b across the fibre
-    Words point, patch;             // hashes: of the point, of 4 mm of its strand
+    Words patch;                    // hash of 4 mm of its strand
 };
 
 constexpr float kPi = 3.14159265f;
@@ -46,7 +46,7 @@ constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed 
 /// Reads 16 points of strands of P points.
 inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (&eye)[3], const Illumination &light) {
     float position[3][16], tangent[3][16], sigma[3][16];
-    uint32_t point[16], patch[16];
+    uint32_t patch[16];
     for (int i = 0; i < 16; ++i) {
         const int j = points[i].j;
         const float *root = points[i].root, *at = root + 3 * j;
@@ -61,7 +61,6 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
         const uint32_t key = mix(points[i].key);
         // The first segment is held, so its length is the same in every frame and patches do not crawl
         const float patches = std::min(j * std::sqrt(spacing) / kPatch + float(key >> 8) * 0x1p-24f, 1e6f);
-        point[i] = mix(key + uint32_t(j));
         patch[i] = mix(key ^ mix(uint32_t(patches)));
     }
     FibrePoints p;
@@ -69,11 +68,11 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     __builtin_memcpy(&x, position, sizeof x);
     __builtin_memcpy(&p.tangent, tangent, sizeof p.tangent);
     __builtin_memcpy(p.level, sigma, sizeof sigma);
-    __builtin_memcpy(&p.point, point, sizeof point);
     __builtin_memcpy(&p.patch, patch, sizeof patch);
     const auto unit = [](Vec3<float> a) { return (1.0f / square_root<float>(dot(a, a) + 1e-30f)) * a; };
     p.tangent = unit(p.tangent);
     p.to_eye = unit({float(eye[0]) - x.x, float(eye[1]) - x.y, float(eye[2]) - x.z});
+    p.at = from_centre(light, x);
     // Hair that is seen lies on the eye's side of its voxel, which is thicker than the layer that covers it
     p.x = in_voxels(light, x) + splat(0.5f) * p.to_eye;
     p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
@@ -100,31 +99,19 @@ RINGLET_INLINE void widened(const FibreTables &tables, Floats spread, Floats cos
     for (int p = 0; p < 3; ++p) M[p] = along(cosines, sines, Lobe(tables.variance[p] + spread));
 }
 
-/// Fibres on the way to a light and behind, and how much the body lets through.
-struct Reach {
-    Floats n, behind, visible;
-};
-
-/// The strand itself is in the grid: half a voxel towards the light leaves it behind. The jitter breaks up the grid.
-RINGLET_INLINE Reach reach(const FibrePoints &p, const Illumination &light, int l) {
-    const Floats step = 0.25f + 0.5f * uniform(mix(p.point + uint32_t(l)));
-    Floats ahead[4], here[4];
-    read_depths(light, l, p.x + step * light.direction(l), ahead);
-    read_depths(light, l, p.x, here);
-    return {ahead[towards], here[away], exponential(-here[body])};
-}
-
 /// What one light adds. noinline: the compiler keeps the 16 lanes in registers only in functions of this size.
 __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illumination &light, int l,
                                                 const FibreTables &tables, const Vec3<float> &normal, Floats radiance[3]) {
     const Vec3<float> L = light.direction(l);
-    const Reach way = reach(p, light, l);
+    const ShadowMap &map = light.shadows->maps[l];
+    Reach way = reach(map, p.at, 1.0f);
 
     // Angles of the fibre's frame
     const Floats sine = clamp(dot(p.tangent, L), -1, 1);
     const Floats cosine = square_root<float>(maximum<float>(1.0f - sine * sine, splat(1e-6f)));
     const Floats difference = p.theta - (0.5f * kPi - arc_cosine(sine));
-    const Floats phi = arc_cosine((dot(p.to_eye, L) - p.sine * sine) / (p.cosine * cosine));
+    const Floats azimuths = clamp((dot(p.to_eye, L) - p.sine * sine) / (p.cosine * cosine), -1, 1), phi = arc_cosine(azimuths);
+    way.n *= 1.0f - shared(way.way * cosine, square_root<float>(2.0f - 2.0f * azimuths), map.width);
     const Place theta((difference < 0.0f ? -difference : difference) * ((tables.T - 1) / kPi), tables.T);
     const Place azimuth(phi * ((tables.H - 1) / kPi), tables.H);
 

@@ -70,23 +70,6 @@ __attribute__((noinline)) inline Floats past_head(const Occluder &head, const Sk
     return open;
 }
 
-/// Fibres between a point anywhere and the light: from where the ray enters the grid.
-inline Floats fibres(const Illumination &light, int l, Vec3<float> g) {
-    const Vec3<float> L = light.direction(l);
-    const Floats from[3] = {g.x, g.y, g.z}, along[3] = {L.x, L.y, L.z};
-    Floats enters = splat(0.0f), leaves = splat(1e30f);
-    for (int axis = 0; axis < 3; ++axis) {
-        const Floats slope = along[axis] < 0.0f ? minimum<float>(along[axis], splat(-1e-6f))
-                                                : maximum<float>(along[axis], splat(1e-6f));
-        const Floats first = (-0.5f - from[axis]) / slope, last = (light.n[axis] - 0.5f - from[axis]) / slope;
-        enters = maximum<float>(enters, minimum<float>(first, last));
-        leaves = minimum<float>(leaves, maximum<float>(first, last));
-    }
-    Floats depths[4];
-    read_depths(light, l, g + enters * L, depths);
-    return enters < leaves ? depths[towards] : splat(0.0f);
-}
-
 /// How far out of the grid: 0 inside, 1 from a sixteenth of its longest side on. There no hair hides the sky.
 RINGLET_INLINE Floats outside(const Illumination &light, const Vec3<float> &g) {
     const Floats at[3] = {g.x, g.y, g.z};
@@ -114,7 +97,7 @@ inline void light_skin(const SkinPoints &p, const Illumination &light, const Occ
                        Floats radiance[3]) {
     const Floats albedo[3] = {p.albedo.x, p.albedo.y, p.albedo.z};
     // Just above the skin: what a half space sees of the sky is half of all directions
-    const Vec3<float> g = in_voxels(light, p.x) + p.normal;
+    const Vec3<float> g = in_voxels(light, p.x) + p.normal, above = from_centre(light, p.x);
     Floats around[8];
     read_surroundings(light, g, around);
     const Floats beyond = outside(light, g);
@@ -126,7 +109,7 @@ inline void light_skin(const SkinPoints &p, const Illumination &light, const Occ
         const Vec3<float> L = light.direction(l);
         const Floats cosine = dot(p.normal, L);
         if (!any<float>(cosine + kSkinReach * p.curvature > 0.0f)) continue;
-        const Floats open = past_head(head, p, clear_of(p.normal, L, cosine)), n = fibres(light, l, g);
+        const Floats open = past_head(head, p, clear_of(p.normal, L, cosine)), n = reach(light.shadows->maps[l], above, 0.0f).n;
         const Floats shine = gloss(p, L, maximum<float>(cosine, splat(0.0f)));
         Floats diffuse[3];
         scattered(cosine, p.curvature, diffuse);

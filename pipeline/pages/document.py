@@ -15,22 +15,14 @@ _STYLE = Path(__file__).with_name("page.css")
 
 
 def document(
-    title: str,
-    body: Iterable[object],
-    styles: Sequence[Path] = (),
-    scripts: Sequence[Path] = (),
-    files: bool = False,
+    title: str, body: Iterable[object], styles: Sequence[Path] = (), scripts: Sequence[Path] = ()
 ) -> str:
-    """A page with the shared style, then `styles`, and `scripts` at its end.
-
-    `files` allows pictures and movies that lie beside the page; otherwise all are inside it.
-    """
+    """A page with the shared style, then `styles`, and `scripts` at its end; all its pictures are inside it."""
     style = "".join(path.read_text("utf-8") for path in (_STYLE, *styles))
     script = "".join(path.read_text("utf-8") for path in scripts)
-    media = "data: file: 'self'" if files else "data:"
     policy = (
         f"default-src 'none'; style-src {_allowed(style)}; script-src {_allowed(script)}; "
-        f"img-src {media}; media-src {media}; base-uri 'none'; form-action 'none'"
+        f"img-src data:; base-uri 'none'; form-action 'none'"
     )
     head = tag(
         "head",

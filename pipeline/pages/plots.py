@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pipeline.pages.markup import Html, tag
 
 WIDTH, HEIGHT = 560, 220  # [px] of the drawing; it scales with the page
-_LEFT, _RIGHT, _TOP, _BOTTOM = 62, 10, 12, 34
+_LEFT, _RIGHT, _TOP, _BOTTOM = 52, 26, 8, 34
 _MOST = 600  # points of a line that are drawn
 
 
@@ -23,8 +23,8 @@ class Line:
     dashed: bool = False
 
 
-def plot(lines: Sequence[Line], x: Sequence[float], x_label: str, y_label: str, title: str) -> Html:
-    """Draw curves over (N,) abscissae; a legend stands below, each colour with its curve's largest value."""
+def plot(lines: Sequence[Line], x: Sequence[float], x_label: str, title: str) -> Html:
+    """Draw curves over (N,) abscissae under a title that names their unit; a legend stands below."""
     finite = [value for line in lines for value in line.values if math.isfinite(value)]
     y_marks = marks(min(finite, default=0.0), max(finite, default=1.0))
     x_marks = marks(min(x, default=0.0), max(x, default=1.0), tight=True)
@@ -43,8 +43,7 @@ def plot(lines: Sequence[Line], x: Sequence[float], x_label: str, y_label: str, 
             tag("text", number(at), x=across(at), y=HEIGHT - _BOTTOM + 16, text_anchor="middle")
             for at in shown
         ),
-        tag("text", x_label, x=WIDTH - _RIGHT, y=HEIGHT - 3, text_anchor="end"),
-        tag("text", y_label, x=4, y=_TOP - 1),
+        tag("text", x_label, x=(_LEFT + WIDTH - _RIGHT) / 2, y=HEIGHT - 3, text_anchor="middle"),
     ]
     curves = [
         tag(

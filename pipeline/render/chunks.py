@@ -26,6 +26,11 @@ class Chunks:
         self._kept: list[Points] = []
         self._there: set[int] = set()
 
+    @property
+    def two_fit(self) -> bool:
+        """Whether memory holds the points of two moments."""
+        return bool(2 * 12 * self._count * self._strands.points <= KEPT)
+
     def move(self, guides: Points, pose: NDArray[np.float64], skin: MovedSkin | None) -> None:
         """Go to a moment, see `Expansion.frame`."""
         self._strands.frame(guides, pose, skin)

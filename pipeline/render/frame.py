@@ -1,6 +1,8 @@
 """One frame: expand the strands, let light through them, shade them, draw them and the head."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 
@@ -68,6 +70,19 @@ class Moment:
     """Where that skin has carried the roots."""
 
 
+@dataclass
+class _Lit:
+    """The strands of a moment, and the light on them."""
+
+    chunks: Chunks
+    lighting: Lighting
+    moment: Moment | None = None
+
+    def beside(self, strands: Expansion, count: int) -> "_Lit":
+        """Another one for the same strands and lights."""
+        return _Lit(Chunks(copy(strands), count), copy(self.lighting))
+
+
 class FrameRenderer:
     """Renders moments of one experiment into one framebuffer."""
 
@@ -88,16 +103,44 @@ class FrameRenderer:
         spread = np.clip(normal(config.seed, key, _MELANIN), -2, 2)
         jitter = render.hair.melanin_jitter * spread
         self.melanin = np.clip(render.hair.melanin + jitter, 0, 0.99).astype(np.float32)
-        self.lighting = Lighting(scene, render.hair, render.grid)
+        self._now = _Lit(Chunks(strands, self.count), Lighting(scene, render.hair, render.grid))
+        self._next = self._now.beside(strands, self.count)
+        self._ahead = ThreadPoolExecutor(1, "light")
         across, down = (side * render.samples for side in render.size)
         # Exposure and tone curve apply to what is lit; the background is meant as it is written.
         background = CURVES[render.tone].linear(np.array(scene.background)) / render.gain
         self.target = Target(across, down, tuple(background.tolist()))
         self.background = DECODED[encode(background)]
         self._coverage = Coverage(self.target, render.size)
-        self._chunks = Chunks(strands, self.count)
         self._widths = np.zeros((0, 0), np.float32)
-        self._lit: Moment | None = None
+
+    @property
+    def lighting(self) -> Lighting:
+        """The light on the moment that is drawn."""
+        return self._now.lighting
+
+    def prepare(self, read: Callable[[], Moment]) -> "Future[Moment]":
+        """Read the moment that is drawn next, and light it as well, both beside the drawing of this one.
+
+        Where memory does not hold the points of two moments it is only read. At most one moment is prepared at a time.
+        """
+        if self._next.moment is not None:  # which is drawn from now on
+            self._now, self._next = self._next, self._now
+        free = self._next
+
+        def ready() -> Moment:
+            moment = read()
+            if free.chunks.two_fit:
+                self._light(free, moment, None)
+            return moment
+
+        free.moment = None
+        return self._ahead.submit(ready)
+
+    def close(self) -> None:
+        """Free the framebuffer."""
+        self._ahead.shutdown()
+        self.target.close()
 
     def pixels(self, moment: Moment, view: View | None = None) -> float:
         """Projected width [px] of strands at a moment."""
@@ -133,7 +176,7 @@ class FrameRenderer:
 
     def layers(self, moment: Moment, view: View) -> Layers:
         """What the picture shows besides colours that `linear` has just given of this moment."""
-        if moment is not self._lit:
+        if moment is not self._now.moment:
             raise ValueError("layers are those of the moment that was rendered last")
         self._clear(moment, view)
         self._draw_head(moment, view.position)
@@ -145,39 +188,42 @@ class FrameRenderer:
         coverage = self._coverage if shape == "coverage" else None
         if coverage is not None:
             coverage.begin(camera)
-        if moment is not self._lit:
-            self._light(moment, coverage)
+        if moment is self._next.moment:
+            self._now, self._next = self._next, self._now
+        if moment is not self._now.moment:
+            self._light(self._now, moment, coverage)
         elif coverage is not None:
-            for first, points in self._chunks:
+            for first, points in self._now.chunks:
                 coverage.count(first, points, self._own_widths(points))
         self._draw_head(moment, camera.position)
         if coverage is not None:
             return coverage.draw(self._drawn, self.lighting.shader(camera.position))
         wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
         veil = self.lighting.veil(camera.position, wider)
-        for first, points in self._chunks:
+        for first, points in self._now.chunks:
             self._draw_strands(shape, camera.position, first, points, veil.visible(points))
         return average(self.target.read(), self.render.samples)
 
     def _clear(self, moment: Moment, camera: View) -> None:
         self.target.clear(camera, *self._depths(camera, self._corners(moment, *_bounds(moment))))
 
-    def _light(self, moment: Moment, coverage: Coverage | None) -> None:
+    def _light(self, to: "_Lit", moment: Moment, coverage: Coverage | None) -> None:
         """First pass: all strands into the density grid."""
-        self._chunks.move(moment.guides, moment.pose, moment.moved)
-        self.lighting.begin(*_bounds(moment), self.width)
-        for first, points in self._chunks:
+        to.moment = None
+        to.chunks.move(moment.guides, moment.pose, moment.moved)
+        to.lighting.begin(*_bounds(moment), self.width, self.count * self.strands.points)
+        for first, points in to.chunks:
             widths = self._own_widths(points)
-            self.lighting.add(points, widths)
+            to.lighting.add(points, widths)
             if coverage is not None:
                 coverage.count(first, points, widths)
         skin = moment.skin or self.skin
-        self.lighting.finish(skin.field if skin else None, moment.pose)
-        self._lit = moment
+        to.lighting.finish(skin.field if skin else None, moment.pose)
+        to.moment = moment
 
     def _drawn(self) -> Iterator[Chunk]:
         """All strands as they are drawn by coverage."""
-        for first, points in self._chunks:
+        for first, points in self._now.chunks:
             own = slice(first, first + len(points))
             fine = smooth(points, self.render.subdivide)
             yield fine, self._own_widths(fine), self.lighting.absorption(self.melanin[own]), self.key[own]
@@ -185,10 +231,11 @@ class FrameRenderer:
     def _own_widths(self, points: Points) -> NDArray[np.float32]:
         """Widths (S, P) [m] of strands (S, P, 3)."""
         strands, count, _ = points.shape
-        if len(self._widths) < strands or self._widths.shape[1] != count:
+        widths = self._widths  # another thread may change which these are
+        if len(widths) < strands or widths.shape[1] != count:
             profile = np.float32(self.width) * taper(self.render, count)
-            self._widths = np.ascontiguousarray(np.broadcast_to(profile, (strands, count)))
-        return self._widths[:strands]
+            self._widths = widths = np.ascontiguousarray(np.broadcast_to(profile, (strands, count)))
+        return widths[:strands]
 
     def _draw_strands(
         self, shape: Shape, eye: Place, first: int, points: Points, visible: NDArray[np.bool_]
@@ -248,11 +295,12 @@ class FrameRenderer:
 
 
 def _bounds(moment: Moment) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners (3,) [m] of a box around the hair, in whole margins: the grid of shadows stands still while hair moves a
-    little, so that nothing shimmers.
+    """Lower and upper corner (3,) [m] of all strands: whole margins, so that the grid of shadows stands still while
+    hair moves a little, and nothing shimmers.
     """
-    lower, upper = (bound(moment.guides, axis=(0, 1)).astype(np.float64) for bound in (np.min, np.max))
-    return _MARGIN * np.floor(lower / _MARGIN - 1), _MARGIN * np.ceil(upper / _MARGIN + 1)
+    lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
+    upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
+    return lower, upper
 
 
 def _box_corners(box: NDArray[np.float64]) -> NDArray[np.float64]:

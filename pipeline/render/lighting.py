@@ -4,6 +4,7 @@ All strands of a frame are added first, in any chunks, because each shadows all 
 holds the strands that are drawn, so that fewer, wider strands cover and shadow as much as many thin ones.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,12 +16,19 @@ from pipeline.config.schema import Fibre, Scene
 from pipeline.render import fibre
 from pipeline.render.lights import as_directions
 from pipeline.render.veil import Veil
+from pipeline.strands.random import uniform
 
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]
 
 _MARGIN: Final = 3
 """Empty voxels around the hair, so that blur and slanted rays lose nothing."""
+_FINER: Final = 3
+"""Nodes of the shadow maps along a voxel."""
+_CASTERS: Final = 400_000
+"""Points of strands from which on not all cast shadows: of c times as many one in c^0.7."""
+_CASTER: Final = 41  # salt
+_NO_LIGHT: Final = np.zeros((0, 3), np.float32)
 _SKY_DIRECTIONS: Final = 26
 _OPAQUE: Final = 4
 """Times that the head is denser for the eye than for light: two voxels of it hide everything."""
@@ -63,8 +71,8 @@ class Lighting:
         self._grid: kernels.DensityGrid | None = None
         self._frame: _Shadowed | None = None
 
-    def begin(self, lower: _F64, upper: _F64, width: float) -> None:
-        """Start a frame: bounds (3,) float64 [m] of all strands, and a typical drawn width [m].
+    def begin(self, lower: _F64, upper: _F64, width: float, points: int = 0) -> None:
+        """Start a frame: bounds (3,) float64 [m] of all strands, a typical drawn width [m], how many points all have.
 
         Raises:
             ValueError: bounds that are not finite or upside down.
@@ -78,27 +86,42 @@ class Lighting:
         shape = 2 * np.ceil((size / spacing + 2 * _MARGIN) / 2).astype(int)
         origin = np.asarray(lower, np.float64) - (shape * spacing - size) / 2
         nx, ny, nz = (int(extent) for extent in shape)
-        self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width, self._directions)
+        self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width, _NO_LIGHT)
+        low = np.asarray(lower, np.float64)
+        self._every = max(math.ceil((points / _CASTERS) ** 0.7), 1)
+        self._shadows = kernels.Shadows(
+            self._directions, low, low + size, spacing / _FINER, width, 1 / self._every
+        )
+        self._added = 0
         self._frame = None
 
     def add(self, points: _F32, widths: _F32) -> None:
-        """Add strands that cast shadows: points (S, P, 3) float32 [m], widths (S, P) float32 [m], in any chunks."""
-        self._started().add(points, widths)
+        """Add strands that cast shadows: points (S, P, 3) float32 [m], widths (S, P) float32 [m], in any chunks.
+
+        Of very many one in each group of neighbours casts the shadows of all: as wide as they are together.
+        """
+        grid = self._started()
+        if self._every > 1:
+            group, place = np.divmod(np.arange(self._added, self._added + len(points)), self._every)
+            chosen = np.flatnonzero(np.floor(uniform(0, group, _CASTER) * self._every) == place)
+            self._added += len(points)
+            points, widths = points[chosen], widths[chosen] * np.float32(self._every)
+        grid.add(points, widths)
+        self._shadows.add(points, widths)
 
     def finish(self, head: kernels.DistanceField | None, pose: _F64) -> None:
         """Let light through what was added and the head, which stands at `pose` (4, 4), rest -> world."""
         grid = self._started()
         origin = np.array(grid.origin)
         density = grid.density()
-        towards = kernels.optical_depth(density[:-1], grid.spacing, self._directions)
-        away = kernels.optical_depth(density[:-1], grid.spacing, -self._directions)
         if head is None:
             body = np.zeros(grid.shape, np.float32)
         else:
             body = kernels.body_density(head, pose, grid.shape, origin, grid.spacing)
-        shadow = kernels.optical_depth(body[None], grid.spacing, self._directions)
         # A fibre seen from all sides shows pi / 4 of its length * width
         hair = density[-1] * np.float32(np.pi / 4)
+        depth = kernels.optical_depth(hair[None], grid.spacing, self._directions)
+        self._shadows.finish(depth, origin, grid.spacing, head, pose)
         sky = kernels.surroundings(
             hair,
             body,
@@ -106,9 +129,7 @@ class Lighting:
             self._loss,
             _evenly_spread(_SKY_DIRECTIONS),
         )
-        light = kernels.Illumination(
-            self._directions, self._irradiance, self._sky, (towards, away, shadow), sky
-        )
+        light = kernels.Illumination(self._directions, self._irradiance, self._sky, self._shadows, sky)
         light.origin, light.spacing, light.glints = grid.origin, grid.spacing, self._hair.glints
         self._frame = _Shadowed(light, head, pose, hair, body)
         self._grid = None

@@ -5,13 +5,13 @@ renderer: under one fingerprint the same key gives the same pixels.
 """
 
 import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +24,12 @@ from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.render.body import DrawnBody
 from pipeline.render.camera import CameraPath
-from pipeline.render.frame import FrameRenderer, Moment, Skin
+from pipeline.render.frame import FrameRenderer, Linear, Moment, Skin
 from pipeline.render.layers import Layers
 from pipeline.render.passes import mean, passes
 from pipeline.render.target import Target
 from pipeline.render.tone import Pixels
 from pipeline.render.view import View
-
-Record = dict[str, Any]
 
 
 def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequence[int] = ()) -> None:
@@ -39,9 +37,15 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
 
     Raises InputError when there is no off-screen OpenGL or the disk is full; Missing or Damaged for caches.
     """
+    with open_frames(config, experiment, key) as opened:
+        opened.render(frames or range(1, config.simulate.frames + 1))
+
+
+@contextmanager
+def open_frames(config: Config, experiment: cache.Experiment, key: str) -> Iterator["Frames"]:
+    """Open what all frames of an experiment share; they can then be rendered in any portions. Raises as `execute`."""
     if config.render.exr:
         exr.library()
-    wanted = frames or range(1, config.simulate.frames + 1)
     with cache.open(experiment.groom, "groom") as groom, cache.open(experiment.strands, "strands") as strands:
         expansion = expansion_from(groom, strands, config)
         keys = strands["strands/key"][:]
@@ -49,40 +53,63 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
         body = DrawnBody(moving, skin, strands["strands/root"][:]) if moving and skin else None
     renderer = FrameRenderer(config, expansion, keys, skin, head)
     path = CameraPath.of(config.scene.camera, head, config.simulate.frames, config.simulate.fps)
-    record = provenance(config, "render")
-    texts = {"config": config.name}
-    shape = ""
-    with (
-        cache.open_guides(experiment.guides) as guides,
-        _writer(experiment.frames) as write,
-        track("render", len(wanted)) as bar,
-    ):
-        moments = Moments(guides, body)
-        for number in wanted:
-            shots = list(passes(config, path, number))
-            name, pixels_wide = renderer.shape(moments.at(number, 0), shots[0].view)
-            if name != shape:
-                say("render", f"strands are {name}, {pixels_wide:.2g} px wide, from frame {number} on")
-                shape = name
-            linear, layers = _frame(renderer, ((moments.at(number, shot.back), shot.view) for shot in shots))
-            texts |= {"geometry": name, "frame": str(number), "fingerprint": fingerprint(renderer.target)}
-            made = Made(experiment.frames / f"{number:04d}", key, record, dict(texts))
-            if layers is not None:
-                write(made.layers, layers.channels(linear, renderer.background))
-            write(made.picture, renderer.developed(linear))
-            bar.advance()
-    renderer.target.close()
+    try:
+        with cache.open_guides(experiment.guides) as guides:
+            yield Frames(
+                config, renderer, path, Stored(guides, body), Pictures(experiment.frames, config, key)
+            )
+    finally:
+        renderer.close()
 
 
-def _frame(
-    renderer: FrameRenderer, shots: Iterable[tuple[Moment, View]]
-) -> tuple[NDArray[np.float32], Layers | None]:
-    """The mean of some views, linear (H, W, 3), and where the config wants them its layers."""
+@dataclass(frozen=True)
+class Frames:
+    """The frames of an experiment, by one renderer."""
+
+    config: Config
+    renderer: FrameRenderer
+    path: CameraPath
+    source: "Source"
+    pictures: "Pictures"
+
+    def render(self, numbers: Sequence[int]) -> None:
+        """Render frames (numbers from 1): while one is drawn the next is read and lit, and the last one written."""
+        shape = ""
+        with ThreadPoolExecutor(1, "write") as pool, track("render", len(numbers)) as bar:
+            moments, writing = self._moments(numbers), None
+            for number in numbers:
+                shots = list(passes(self.config, self.path, number))
+                name, wide = self.renderer.shape(moments.at(number, shots[0].back), shots[0].view)
+                if name != shape:
+                    say("render", f"strands are {name}, {wide:.2g} px wide, from frame {number} on")
+                    shape = name
+                seen = ((moments.at(number, shot.back), shot.view) for shot in shots)
+                linear, layers = _mean_of(self.renderer, seen)
+                if writing is not None:
+                    writing.result()
+                texts = {"geometry": name, "fingerprint": fingerprint(self.renderer.target)}
+                writing = pool.submit(self._write, number, linear, layers, texts)
+                bar.advance()
+            if writing is not None:
+                writing.result()
+
+    def _moments(self, numbers: Sequence[int]) -> "Moments":
+        order = [(number, shot.back) for number in numbers for shot in passes(self.config, self.path, number)]
+        return Moments(list(dict.fromkeys(order)), self.source, self.renderer)
+
+    def _write(self, number: int, linear: Linear, layers: Layers | None, texts: dict[str, str]) -> None:
+        if layers is not None:
+            self.pictures.write_layers(number, layers.channels(linear, self.renderer.background), texts)
+        self.pictures.write(number, self.renderer.developed(linear), texts)
+
+
+def _mean_of(renderer: FrameRenderer, shots: Iterable[tuple[Moment, View]]) -> tuple[Linear, Layers | None]:
+    """The mean of some views, linear (H, W, 3), and its layers where the config wants them."""
     if not renderer.render.exr:
         return mean(renderer.linear(*shot) for shot in shots), None
     strands: list[NDArray[np.uint32]] = []
 
-    def both() -> Iterator[NDArray[np.float32]]:
+    def both() -> Iterator[Linear]:
         for shot in shots:
             linear, layers = renderer.linear(*shot), renderer.layers(*shot)
             if not strands:
@@ -94,21 +121,74 @@ def _frame(
 
 
 class Moments:
-    """What is drawn of a simulation; the last one that was asked for is kept as it is."""
+    """What is drawn, one moment after another in a known order: the next is made ready beside the drawing."""
 
-    def __init__(self, guides: cache.GuidesReader, body: DrawnBody | None) -> None:
-        self._guides, self._body = guides, body
-        self._at = lru_cache(1)(self._read)
+    def __init__(self, order: Sequence[tuple[int, int]], source: "Source", renderer: FrameRenderer) -> None:
+        """Moments as (frame from 1, states before it), none of them twice."""
+        self._order, self._source, self._renderer = iter(order), source, renderer
+        self._here: tuple[int, int] | None = None
+        self._moment: Moment | None = None
+        self._coming: tuple[tuple[int, int], Future[Moment]] | None = None
+        self._fetch()
 
     def at(self, number: int, back: int) -> Moment:
-        """The moment of a frame, counted from 1, or `back` states before it."""
-        return self._at(number, back)
+        """The moment of a frame, counted from 1, or `back` states before it; the same object while it is asked again."""
+        if self._moment is None or (number, back) != self._here:
+            if self._coming is None or self._coming[0] != (number, back):
+                raise ValueError(f"frame {number}, {back} states before it, comes out of its order")
+            self._here, self._moment = (number, back), self._coming[1].result()
+            self._fetch()
+        return self._moment
 
-    def _read(self, number: int, back: int) -> Moment:
-        moment = Moment(*self._guides.state(number - 1, back))
-        if self._body is None:
+    def _fetch(self) -> None:
+        place = next(self._order, None)
+        self._coming = place and (place, self._renderer.prepare(partial(self._source.read, *place)))
+
+
+class Source(Protocol):
+    """Where moments come from."""
+
+    def read(self, number: int, back: int) -> Moment:
+        """The moment of a frame, counted from 1, or `back` states before it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Stored:
+    """Moments as a simulation has stored them."""
+
+    guides: cache.GuidesReader
+    body: DrawnBody | None
+
+    def read(self, number: int, back: int) -> Moment:
+        """See `Source`."""
+        moment = Moment(*self.guides.state(number - 1, back))
+        if self.body is None:
             return moment
-        return self._body.at(max(0.0, number - 1 - back / self._guides.states), moment)
+        return self.body.at(max(0.0, number - 1 - back / self.guides.states), moment)
+
+
+class Pictures:
+    """Where frames are written."""
+
+    def __init__(self, folder: Path, config: Config, key: str) -> None:
+        self._folder, self._key = folder, key
+        self._record = provenance(config, "render")
+        self._texts = {"config": config.name}
+
+    def write(self, number: int, picture: Pixels, texts: dict[str, str]) -> None:
+        """Write a frame with its key, what it was made from and `texts`. Raises InputError when the disk is full."""
+        path, texts = self._named(number, ".png", texts)
+        cache.write_picture(path, picture, self._key, self._record, **texts)
+
+    def write_layers(self, number: int, channels: Mapping[str, NDArray[Any]], texts: dict[str, str]) -> None:
+        """Write the layers of a frame in the same way."""
+        path, texts = self._named(number, ".exr", texts)
+        cache.write_layers(path, channels, self._key, self._record, **texts)
+
+    def _named(self, number: int, suffix: str, texts: dict[str, str]) -> tuple[Path, dict[str, str]]:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        return self._folder / f"{number:04d}{suffix}", self._texts | {"frame": str(number)} | texts
 
 
 def fingerprint(target: Target) -> str:
@@ -127,50 +207,6 @@ def _processor() -> str:
         return platform.machine()
     wanted = ("vendor_id", "cpu family", "model\t", "model name")
     return " ".join(dict.fromkeys(line.split(":", 1)[1].strip() for line in lines if line.startswith(wanted)))
-
-
-@dataclass(frozen=True)
-class Made:
-    """A frame that was made: its files, but for their suffix, and what they say of it."""
-
-    path: Path
-    key: str
-    record: Record
-    texts: dict[str, str]
-
-    def picture(self, pixels: Pixels) -> None:
-        """Write the PNG."""
-        cache.write_picture(self.path.with_suffix(".png"), pixels, self.key, self.record, **self.texts)
-
-    def layers(self, channels: Mapping[str, NDArray[Any]]) -> None:
-        """Write the EXR."""
-        cache.write_layers(self.path.with_suffix(".exr"), channels, self.key, self.record, **self.texts)
-
-
-class _Write:
-    """Writes one file at a time beside the rendering of the next frame."""
-
-    def __init__(self, pool: ThreadPoolExecutor, folder: Path) -> None:
-        self._pool, self._folder = pool, folder
-        self._last: Future[None] | None = None
-
-    def __call__(self, write: Callable[[Any], None], what: Any) -> None:
-        self.wait()
-        self._folder.mkdir(parents=True, exist_ok=True)
-        self._last = self._pool.submit(write, what)
-
-    def wait(self) -> None:
-        """Wait for the file that is being written; raises what went wrong with it."""
-        if self._last is not None:
-            self._last.result()
-
-
-@contextmanager
-def _writer(folder: Path) -> Iterator[_Write]:
-    with ThreadPoolExecutor(1) as pool:
-        writer = _Write(pool, folder)
-        yield writer
-        writer.wait()
 
 
 def _skin(groom: cache.Reader) -> Skin | None:

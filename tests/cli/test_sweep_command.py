@@ -82,7 +82,7 @@ def test_the_table_has_values_metrics_times_and_paths_of_every_run(sweep: Sweep)
     sweep()
     table = sweep.table()
     assert table["keys"] == ["simulate.hair.young_modulus", "scene.lights[0].irradiance"]
-    assert sweep.printed.strip() == str(sweep.outputs / "x/sweep.json")
+    assert sweep.printed.split() == [str(sweep.outputs / "x" / name) for name in ("sweep.json", "sweep.html")]
     for row in table["runs"]:
         assert row["complete"]
         assert set(row["values"]) == set(table["keys"])

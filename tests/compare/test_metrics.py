@@ -1,12 +1,15 @@
 """The metrics rank what users care about, and the gates let through what they should."""
 
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image, PngImagePlugin
 
-from pipeline.compare import Limits, compare, judge, measure
+from pipeline import cache
+from pipeline.compare import Limits, compare, judge, load_picture, measure
 from pipeline.compare.pictures import Display
 from pipeline.errors import InputError
 
@@ -102,8 +105,49 @@ def test_linear_pictures_are_compared_beyond_white(tmp_path: Path) -> None:
     assert not compare(paths[0], paths[2]).identical
     assert compare(paths[2], paths[2]).identical
     Image.fromarray(strands()[:24, :24]).save(tmp_path / "a.png")
-    with pytest.raises(InputError, match="one is linear"):
+    with pytest.raises(InputError, match="float32 and uint8"):
         compare(paths[0], tmp_path / "a.png")
+
+
+def test_the_low_bits_of_sixteen_are_seen(tmp_path: Path) -> None:
+    """Pillow reads 16 bits a channel as 8; rows by every filter of PNG."""
+    pixels = np.random.default_rng(5).integers(0, 65536, (5, 7, 3), np.uint16)
+    other = pixels.copy()
+    other[2, 3, 1] ^= 1
+    cache.write_picture(tmp_path / "a.png", pixels, "", {})
+    cache.write_picture(tmp_path / "b.png", other, "", {})
+    found = compare(tmp_path / "a.png", tmp_path / "b.png").pairs[0].metrics
+    assert found is not None
+    assert found.changed == pytest.approx(1 / 35)
+    coded = filtered(pixels)
+    header = struct.pack(">IIBBBBB", 7, 5, 16, 2, 0, 0, 0)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(coded)), (b"IEND", b""))
+    parts = [
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in chunks
+    ]
+    (tmp_path / "c.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
+    np.testing.assert_array_equal(load_picture(tmp_path / "c.png"), pixels)
+    (tmp_path / "c.png").write_bytes((tmp_path / "a.png").read_bytes()[:-60])
+    with pytest.raises(InputError, match="not a readable picture"):
+        load_picture(tmp_path / "c.png")
+
+
+def filtered(pixels: np.ndarray) -> bytes:
+    """Row i by filter i: none, sub, up, average, Paeth, as the specification defines them."""
+    rows = pixels.astype(">u2").view(np.uint8).reshape(len(pixels), -1).astype(int)
+    out = bytearray()
+    for kind, row in enumerate(rows):
+        above = rows[kind - 1] if kind else 0 * row
+        left, corner = (np.concatenate([np.zeros(6, int), line[:-6]]) for line in (row, above))
+        p = left + above - corner
+        far = np.abs([p - left, p - above, p - corner])
+        paeth = np.where(
+            (far[0] <= far[1]) & (far[0] <= far[2]), left, np.where(far[1] <= far[2], above, corner)
+        )
+        guess = (0 * row, left, above, (left + above) // 2, paeth)[kind]
+        out += bytes([kind]) + ((row - guess) % 256).astype(np.uint8).tobytes()
+    return bytes(out)
 
 
 def test_transparency_is_seen(tmp_path: Path) -> None:

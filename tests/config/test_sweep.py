@@ -84,6 +84,7 @@ def test_a_value_may_name_a_file_relative_to_the_config(tmp_path: Path) -> None:
     assert found.runs[1].loaded.config.simulate.motion.file == str(tmp_path / "a b/two.csv")
     assert found.runs[0].name.startswith("x@file=one-")
     (child := tmp_path / "sub").mkdir()
+    (tmp_path / "Makefile").touch()  # one project
     (child / "y.toml").write_text('extends = "../x.toml"\n')
     inherited = load_sweep(child / "y.toml")
     assert inherited.runs[0].loaded.config.simulate.motion.file == str(tmp_path / "a b/one.csv")

@@ -4,7 +4,7 @@
 
 Files that hold up are damaged in the ways that disks, networks and enemies do it: bits flipped, the end cut off, pieces
 moved, doubled or left out, numbers of headers and of text replaced by those that break programs. Each one is read under
-the limits of its size: address space that is in use already, 64 MB and 64 bytes for each byte of the file; 5 s. A
+the limits of its size: address space that is in use already, 64 MB and 64 bytes for each byte of the file; 5 s of processor time. A
 library that crashes on one is contained when `read_groom` makes a message of it. Exit code 1 when anything else than
 strands or a message came out.
 """
@@ -38,7 +38,8 @@ from pipeline.strands.formats.tfx import write_tfx  # noqa: E402
 from pipeline.strands.formats.usc_data import write_data  # noqa: E402
 from pipeline.strands.formats.vtk_lines import write_vtp  # noqa: E402
 
-SECONDS = 5
+SECONDS = 5  # of processor time
+PATIENCE = 12  # elapsed seconds for each: other processes need theirs
 BATCH = 200  # files that one process reads
 MEMORY, MEMORY_PER_BYTE = 64 << 20, 64
 SHARE = {".hair": 24, ".tfx": 24, ".data": 22, ".vtp": 12, ".usda": 8, ".usdc": 4, ".abc": 4, ".vtkhdf": 2}
@@ -210,6 +211,7 @@ def work(path: Path, whole: list[bytes], seed: int, numbers: range, outcomes: IO
     os.dup2(silence, 1)
     os.dup2(silence, 2)
     faulthandler.disable()
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     read = READERS.get(path.suffix) or LIBRARIES[path.suffix]
@@ -217,7 +219,8 @@ def work(path: Path, whole: list[bytes], seed: int, numbers: range, outcomes: IO
     for number in numbers:
         size = make(path, whole, seed, number)
         resource.setrlimit(resource.RLIMIT_AS, (begin + MEMORY_PER_BYTE * size, resource.RLIM_INFINITY))
-        signal.setitimer(signal.ITIMER_REAL, SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        signal.setitimer(signal.ITIMER_REAL, PATIENCE * SECONDS)
         outcomes.write(judged(read, path) + "\n")
         outcomes.flush()
 

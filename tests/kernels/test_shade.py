@@ -19,27 +19,31 @@ FAR = 1e4
 
 @dataclass(frozen=True)
 class Room:
-    """The same depths everywhere: fibres towards and behind, body, and a normal."""
+    """The same everywhere: strands towards the light and behind, whether the head is before it, and a normal."""
 
     n: float = 0.0
     behind: float = 0.0
-    body: float = 0.0
+    dark: bool = False
     sky: float = 0.0
     normal: tuple[float, float, float] = (0.0, 1.0, 0.0)
 
     def light(self, directions: _F64, irradiance: float = 1.0, glints: bool = False) -> kernels.Illumination:
         """These depths for lights in these directions (L, 3)."""
-        count, n = len(directions), 4
-        towards, away, body = (
-            np.full((count, n, n, n), depth, np.float32) for depth in (self.n, self.behind, self.body)
-        )
+        corner, n = np.ones(3), 4
+        shadows = kernels.Shadows(directions.astype(np.float32), -corner, corner, 0.5, 1e-9)
+        shadows.finish(np.zeros((len(directions), 1, 1, 1), np.float32), corner, 1.0, None, np.eye(4))
+        for index in range(len(directions)):
+            surface, layers, solid = shadows.map(index)
+            # Far behind the first strand no ray to the eye shares strands with the one to the light
+            surface[..., 0], surface[..., 1] = -1e6, self.n + self.behind
+            layers[...], solid[...] = self.n, -1e9 if self.dark else 1e9
         around = np.zeros((n // 2, n // 2, n // 2, 8), np.float32)
         around[..., :3], around[..., 4:7] = 1, self.normal
         light = kernels.Illumination(
             directions.astype(np.float32),
-            np.full((count, 3), irradiance, np.float32),
+            np.full((len(directions), 3), irradiance, np.float32),
             np.full(3, self.sky, np.float32),
-            (towards, away, body),
+            shadows,
             around,
         )
         light.glints = glints
@@ -104,8 +108,7 @@ def formula(tangents: _F64, eye: _F64, L: _F64, sigma: float, room: Room) -> _F6
         reflected = sum(along(si[k], so[k], v[p] + v_J) * G[p, 1] for p in range(4))
         c = np.pi / 2 * max(0.2, float(np.dot(room.normal, L)))
         result[k] = np.exp(-n) * direct + (down - np.exp(-n)) * scattered + c * up * reflected
-    visible: _F64 = result * np.exp(-room.body)
-    return visible
+    return result
 
 
 def random_tangents(count: int, seed: int) -> _F64:
@@ -113,7 +116,7 @@ def random_tangents(count: int, seed: int) -> _F64:
 
 
 @pytest.mark.parametrize(
-    "room", [Room(), Room(n=0.4, behind=2.0), Room(n=3.0, behind=0.5, body=0.7), Room(n=12.0, behind=20.0)]
+    "room", [Room(), Room(n=0.4, behind=2.0), Room(n=3.0, behind=0.5), Room(n=12.0, behind=20.0)]
 )
 def test_kernel_follows_the_two_flux_formula(room: Room) -> None:
     eye, L = unit(np.array([0.3, 0.4, 0.9])), unit(np.array([-0.5, 0.7, 0.2]))
@@ -152,6 +155,15 @@ def test_white_furnace_returns_what_it_gets() -> None:
         print(f"theta_o {degrees}: {found:.4f}")
         # 0.986 .. 1.000 on average: theta_d in place of theta_o
         assert 0.95 < found < 1.01
+
+
+def test_behind_the_head_no_light_comes() -> None:
+    lit, dark = (
+        radiance(random_tangents(8, 6), np.array([0.0, 0, 1]), room.light(spread(3)), 0.3)
+        for room in (Room(), Room(dark=True))
+    )
+    assert lit.min() > 0
+    assert dark.max() == 0
 
 
 def test_sky_alone_lights_a_fibre_with_its_albedo() -> None:

@@ -22,10 +22,7 @@ from pipeline.config.schema import (
 from pipeline.groom import stage as groom_stage
 from pipeline.interpolate import stage as interpolate_stage
 from pipeline.render import stage as render_stage
-from pipeline.render.camera import CameraPath
-from pipeline.render.frame import FrameRenderer
 from pipeline.render.passes import mean, passes
-from pipeline.render.stage import Moments
 from pipeline.render.tone import develop
 from pipeline.simulate import stage as simulate_stage
 
@@ -67,8 +64,10 @@ def test_frames_do_not_depend_on_which_are_made_together(
     for name in ("groom", "guides", "strands"):
         (tmp_path / f"{name}.h5").symlink_to(getattr(made, name))
     apart = cache.Experiment(tmp_path)
-    for frames in ((3,), (1, 2)):
-        render_stage.execute(config, apart, "key", frames)
+    render_stage.execute(config, apart, "key", (2,))
+    with render_stage.open_frames(config, apart, "key") as frames:
+        frames.render((3,))
+        frames.render((1,))
     for number in (1, 2, 3):
         name = f"{number:04d}.png"
         assert (made.frames / name).read_bytes() == (apart.frames / name).read_bytes()
@@ -76,17 +75,10 @@ def test_frames_do_not_depend_on_which_are_made_together(
 
 def test_a_blurred_frame_is_the_mean_of_its_states(swinging: tuple[Config, cache.Experiment]) -> None:
     config, made = swinging
-    with (
-        cache.open(made.groom) as groom,
-        cache.open(made.strands) as strands,
-        cache.open_guides(made.guides) as guides,
-    ):
-        expansion, keys = render_stage.expansion_from(groom, strands, config), strands["strands/key"][:]
-        renderer = FrameRenderer(config, expansion, keys)
-        moments = Moments(guides, None)
-        shots = list(passes(config, CameraPath.of(CAMERA, render_stage.placement(groom), 3), 3))
-        apart = [renderer.linear(moments.at(3, shot.back), shot.view).copy() for shot in shots]
-        renderer.target.close()
+    with render_stage.open_frames(config, made, "key") as frames:
+        shots = list(passes(config, frames.path, 3))
+        moments = {back: frames.source.read(3, back) for back in {shot.back for shot in shots}}
+        apart = [frames.renderer.linear(moments[shot.back], shot.view).copy() for shot in shots]
     blurred = develop(mean(iter(picture.copy() for picture in apart)), config.render.exposure)
     assert sorted({shot.back for shot in shots}) == [0, 1, 2]
     assert np.array_equal(blurred, pixels(made.frames / "0003.png"))

@@ -3,8 +3,7 @@
 A strand is a curve; strands are counted over the prims in the order of the stage. Read are all prims that are drawn:
 active, visible, of purpose "default" or "render", instances too, each where its transforms put it at the first time
 of the stage. `widths` are diameters in the space of their prim. The stage says its unit and its up axis; one that
-does not is in centimetres with y up, by definition. Layers that it names are read too, but a change of those alone
-makes no groom stale. Written are metres with y up and Catmull and Rom's curves through the points, pinned; the time of
+does not is in centimetres with y up, by definition. Layers that it names are read too. Written are metres with y up and Catmull and Rom's curves through the points, pinned; the time of
 a sample is the frame's number; primvars:st are the UVs of roots. Source: the documentation of UsdGeomBasisCurves and UsdGeomMetrics.
 """
 

@@ -1,0 +1,96 @@
+// Python's view of the shadow maps.
+#include "bindings.hpp"
+
+#include "shadows.hpp"
+
+#include <nanobind/stl/shared_ptr.h>
+
+namespace ringlet {
+
+using Doubles = Array<const double, 3>;
+using Directions = Array<const float, -1, 3>;
+
+static void make_shadows(Shadows *shadows, Directions directions, Doubles lower, Doubles upper, double spacing, double width, double share) {
+    Bounds bounds{};
+    bounds.spacing = float(spacing), bounds.width = float(width), bounds.share = float(share);
+    require(spacing > 0 && std::isfinite(spacing), "Shadows: expected a positive spacing");
+    require(width > 0 && std::isfinite(width), "Shadows: expected a positive width");
+    require(share > 0 && share <= 1, "Shadows: expected a share of 0 .. 1");
+    for (int k = 0; k < 3; ++k) {
+        bounds.lower[k] = lower.data()[k], bounds.upper[k] = upper.data()[k];
+        const double size = bounds.upper[k] - bounds.lower[k];
+        require(size >= 0 && size < 2000 * spacing, "Shadows: expected bounds of 0 .. 2000 spacings");
+    }
+    new (shadows) Shadows{};
+    for (size_t l = 0; l < directions.shape(0); ++l) {
+        const float *d = directions.data() + 3 * l;
+        require(std::abs(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - 1) < 1e-4f, "Shadows: expected unit directions");
+        shadows->maps.push_back(empty_map(d, bounds));
+    }
+}
+
+static void add(Shadows &shadows, Array<const float, -1, -1, 3> points, Array<const float, -1, -1> widths) {
+    const size_t S = points.shape(0), P = points.shape(1);
+    require(widths.shape(0) == S && widths.shape(1) == P, "Shadows.add: widths do not have the shape of points");
+    require(shadows.casters.P == 0 || shadows.casters.P == int(P), "Shadows.add: strands differ in their number of points");
+    shadows.add(points.data(), widths.data(), S, int(P));
+}
+
+static void finish(Shadows &shadows, Array<const float, -1, -1, -1, -1> depth, Doubles origin, double spacing,
+                   const DistanceField *field, Array<const double, 4, 4> pose) {
+    require(depth.shape(0) == shadows.maps.size(), "Shadows.finish: depth does not fit the lights");
+    require(spacing > 0, "Shadows.finish: expected a positive spacing");
+    const Pose to_world = Pose::of(pose.data());
+    std::vector<Depths> depths;
+    for (size_t l = 0; l < shadows.maps.size(); ++l) {
+        Depths voxels{depth.data() + l * depth.shape(1) * depth.shape(2) * depth.shape(3), {}, {}, float(1 / spacing)};
+        for (int k = 0; k < 3; ++k) {
+            voxels.n[k] = int(depth.shape(k + 1));
+            voxels.origin[k] = float(origin.data()[k] + 0.5 * spacing - shadows.maps[l].centre[k]);
+        }
+        depths.push_back(voxels);
+    }
+    nb::gil_scoped_release release;
+    shadows.finish(depths, field, to_world, threads());
+}
+
+static nb::ndarray<nb::numpy, float> reached(const Shadows &shadows, int light, Array<const float, -1, 3> points, float own) {
+    require(light >= 0 && light < int(shadows.maps.size()), "Shadows.reach: no such light");
+    const ShadowMap &map = shadows.maps[light];
+    require(!map.layers.empty(), "Shadows.reach: finish the shadows first");
+    const size_t N = points.shape(0);
+    auto result = new_array<float>({N, size_t(3)});
+    float *out = result.data();
+    for (size_t first = 0; first < N; first += 16) {
+        Floats x[3];
+        for (size_t k = 0; k < 16; ++k)
+            for (int c = 0; c < 3; ++c) x[c][k] = float(points.data()[3 * std::min(first + k, N - 1) + c] - map.centre[c]);
+        const Reach found = reach(map, {x[0], x[1], x[2]}, own);
+        for (size_t k = 0; k < 16 && first + k < N; ++k)
+            out[3 * (first + k)] = found.n[k], out[3 * (first + k) + 1] = found.behind[k], out[3 * (first + k) + 2] = found.visible[k];
+    }
+    return result;
+}
+
+static nb::tuple map_of(nb::handle self, int light) {
+    Shadows &shadows = nb::cast<Shadows &>(self);
+    require(light >= 0 && light < int(shadows.maps.size()), "Shadows.map: no such light");
+    ShadowMap &map = shadows.maps[light];
+    require(!map.layers.empty(), "Shadows.map: finish the shadows first");
+    const size_t nu = map.n[0], nv = map.n[1];
+    using View = nb::ndarray<nb::numpy, float>;
+    return nb::make_tuple(View(map.surface.data(), {nu, nv, size_t(2)}, self), View(map.layers.data(), {nu, nv, size_t(ShadowMap::kLayers)}, self),
+                          View(map.solid.data(), {nu, nv}, self));
+}
+
+void bind_shadow(nb::module_ &m) {
+    nb::class_<Shadows>(m, "Shadows")
+        .def("__init__", &make_shadows, nb::arg("directions"), nb::arg("lower"), nb::arg("upper"), nb::arg("spacing"), nb::arg("width"),
+             nb::arg("share") = 1.0)
+        .def("add", &add, nb::arg("points"), nb::arg("widths"))
+        .def("finish", &finish, nb::arg("depth"), nb::arg("origin"), nb::arg("spacing"), nb::arg("field").none(), nb::arg("pose"))
+        .def("map", &map_of, nb::arg("light"))
+        .def("reach", &reached, nb::arg("light"), nb::arg("points"), nb::arg("own") = 0.0f);
+}
+
+} // namespace ringlet

@@ -1,0 +1,57 @@
+"""How alike two linear pictures are where hair covers whole pixels.
+
+Colour: ratio of the means. Place of light and shadow: correlation of means of 17 x 17 pixels. Fibre detail: contrast,
+the root mean square difference between a pixel and the mean around it over the mean; and the 99th percentile over the
+mean, both of luminance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+_F32 = NDArray[np.float32]
+_F64 = NDArray[np.float64]
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_REGION = 17  # [px]
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """Of a picture, and of the path-traced one."""
+
+    ratio: tuple[float, float, float]
+    """Mean of ours by the reference's: R, G, B."""
+    correlation: float
+    """Of means of 17 x 17 pixels."""
+    contrast: tuple[float, float]
+    """Of ours and of the reference."""
+    highlights: tuple[float, float]
+    """99th percentile over the mean, of ours and of the reference."""
+
+
+def compare(ours: _F32, reference: _F32, mask: NDArray[np.bool_], region: int = _REGION) -> Likeness:
+    """Compare pictures (H, W, 3) where the mask (H, W) is set."""
+    means = [picture[mask].mean(axis=0, dtype=np.float64) for picture in (ours, reference)]
+    light = [picture.astype(np.float64) @ LUMINANCE for picture in (ours, reference)]
+    weight = uniform_filter(mask.astype(np.float64), region)
+    near = [uniform_filter(each * mask, region) / np.maximum(weight, 1e-9) for each in light]
+    well = mask & (weight > 0.5)
+    r, g, b = (float(x) for x in means[0] / means[1])
+    return Likeness(
+        (r, g, b),
+        float(np.corrcoef(near[0][well], near[1][well])[0, 1]),
+        _pair(_contrast(each, around, mask) for each, around in zip(light, near, strict=True)),
+        _pair(float(np.percentile(each[mask], 99) / each[mask].mean()) for each in light),
+    )
+
+
+def _pair(values):
+    a, b = values
+    return a, b
+
+
+def _contrast(light: _F64, near: _F64, mask: NDArray[np.bool_]) -> float:
+    return float(np.sqrt(np.mean((light - near)[mask] ** 2)) / light[mask].mean())
