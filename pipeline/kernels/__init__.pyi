@@ -804,6 +804,15 @@ class FibreShader(PointShader):
     def __init__(self, light: Illumination, tables: FibreTables, eye: _F64) -> None:
         """Light, scattering of one fibre, and the eye (3,) float64 [m] that looks; light and tables are held."""
 
+class DistanceShader(PointShader):
+    """Colours points (1, 1, distance along the line of sight [m])."""
+
+    def __init__(self, eye: _F64, ahead: _F64) -> None:
+        """The eye (3,) [m] and the unit line of sight (3,), float64."""
+
+class TangentShader(PointShader):
+    """Colours points by the unit direction of their strands from root to tip, in the world."""
+
 class Surface:
     """Points of the head's surface."""
 
@@ -909,9 +918,16 @@ class Raster:
         What may be seen of them is copied.
         """
 
-    def compose(self, backdrop: Backdrop, shader: PointShader, picture: _F32) -> int:
+    def compose(
+        self,
+        backdrop: Backdrop,
+        shader: PointShader,
+        picture: _F32,
+        names: NDArray[np.uint32] | None = None,
+    ) -> int:
         """Draw what was added over the backdrop into a picture (H, W, 3), linear RGB.
 
+        Names (H, W) get the key of the strand that takes most of a pixel, 0 where there is no hair.
         Points are shaded when a segment of theirs comes to a pixel that is not full. Returns how many tiles lack hair
         that was cut off too early. If there are any, `add` all strands once more and compose again: only the pixels
         that lack hair are drawn, with nothing cut off.

@@ -1,11 +1,14 @@
 // Python's view of the raster.
 #include "bindings.hpp"
 
+#include "layer_shaders.hpp"
 #include "raster.hpp"
 
 #include <array>
+#include <optional>
 
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 
 namespace ringlet {
 
@@ -77,15 +80,26 @@ static void add(Raster &raster, Points points, Widths widths, Array<const float,
     raster.bins.add(raster.view, {points.data(), widths.data(), absorption.data(), key.data(), int(S), int(P)}, threads());
 }
 
-static int compose(Raster &raster, const HeldBackdrop &back, const PointShader &shader, Picture picture) {
+static int compose(Raster &raster, const HeldBackdrop &back, const PointShader &shader, Picture picture,
+                   std::optional<Array<uint32_t, -1, -1>> names) {
     fits(raster, back);
     require(!raster.bins.cut.empty(), "Raster.compose: before cut_off");
     require(picture.shape(0) == size_t(raster.view.H) && picture.shape(1) == size_t(raster.view.W), "Raster.compose: the picture has another size");
+    require(!names || (names->shape(0) == picture.shape(0) && names->shape(1) == picture.shape(1)), "Raster.compose: names have another size");
+    const Pictures pictures{picture.data(), names ? names->data() : nullptr};
     nb::gil_scoped_release release;
-    return raster.compose(back, shader, picture.data(), threads());
+    return raster.compose(back, shader, pictures, threads());
+}
+
+static void make_distances(DistanceShader *shader, Array<const double, 3> eye, Array<const double, 3> ahead) {
+    new (shader) DistanceShader;
+    std::copy(eye.data(), eye.data() + 3, shader->eye);
+    std::copy(ahead.data(), ahead.data() + 3, shader->ahead);
 }
 
 void bind_raster(nb::module_ &m) {
+    nb::class_<DistanceShader, PointShader>(m, "DistanceShader").def("__init__", &make_distances, nb::arg("eye"), nb::arg("ahead"));
+    nb::class_<TangentShader, PointShader>(m, "TangentShader").def(nb::init<>());
     nb::class_<HeldBackdrop>(m, "Backdrop")
         .def("__init__", &make_backdrop, nb::arg("depth"), nb::arg("samples"), nb::arg("decode"), nb::arg("per_side"));
     nb::class_<Raster>(m, "Raster")
@@ -94,7 +108,7 @@ void bind_raster(nb::module_ &m) {
         .def("count", &count, nb::arg("points"), nb::arg("widths"), nb::arg("first"))
         .def("cut_off", &cut_off, nb::arg("backdrop"))
         .def("add", &add, nb::arg("points"), nb::arg("widths"), nb::arg("absorption"), nb::arg("key"))
-        .def("compose", &compose, nb::arg("backdrop"), nb::arg("shader"), nb::arg("picture"))
+        .def("compose", &compose, nb::arg("backdrop"), nb::arg("shader"), nb::arg("picture"), nb::arg("names") = nb::none())
         .def_ro("shaded", &Raster::shaded);
 }
 

@@ -7,15 +7,21 @@
 
 namespace ringlet {
 
+/// What is drawn into.
+struct Pictures {
+    float *colour;   // (H, W, 3)
+    uint32_t *names; // (H, W) key of the strand that takes most of a pixel, 0 where there is none; or null
+};
+
 class Painter {
   public:
     size_t shaded = 0; // points
 
-    Painter(const View &view, const Backdrop &back, Bins &bins, const PointShader &shader)
-        : view_(view), bins_(bins), shader_(shader), tile_(view, back) {}
+    Painter(const View &view, const Backdrop &back, Bins &bins, const PointShader &shader, const Pictures &pictures)
+        : view_(view), bins_(bins), shader_(shader), pictures_(pictures), tile_(view, back, pictures.names) {}
 
     /// Draws the wrong tiles of a block, and sets what is wrong with them now; how many of them still are.
-    int block(int block, const uint32_t *number, size_t count, uint8_t *wrong, TilePixels *lacking, float *picture) {
+    int block(int block, const uint32_t *number, size_t count, uint8_t *wrong, TilePixels *lacking) {
         sort_into_tiles(block, number, count, wrong);
         int still = 0;
         for (int tile = block * kCount; tile < (block + 1) * kCount; ++tile) {
@@ -23,7 +29,8 @@ class Painter {
             tile_.begin(tile, bins_.wanted.empty() ? TilePixels::all() : bins_.wanted[tile]);
             order_.begin(entries_[tile - block * kCount]);
             lacking[tile] = draw(bins_.cut[tile]);
-            tile_.write(picture);
+            tile_.write(pictures_.colour);
+            if (pictures_.names) tile_.name([&](int x, int y, int k) { pictures_.names[size_t(y) * view_.W + x] = k < 0 ? 0 : key(k); });
             wrong[tile] = lacking[tile].some();
             still += wrong[tile];
         }
@@ -37,6 +44,7 @@ class Painter {
     const View &view_;
     Bins &bins_;
     const PointShader &shader_;
+    const Pictures &pictures_;
     Tile tile_;
     TileMiddles middle_;
     DepthOrder order_;
@@ -50,6 +58,12 @@ class Painter {
     std::vector<float> radiance_;
     Words reached_[kPortion]; // pixels of each entry
     uint32_t drawn_[kPortion]; // its segment
+
+    /// The key of the strand of segment i of the block.
+    uint32_t key(int i) const {
+        const uint32_t point = bins_.seen(number_[i])->number & ~SeenPoint::kKnown;
+        return bins_.batch(number_[i]).key[point / uint32_t(bins_.P)];
+    }
 
     void sort_into_tiles(int block, const uint32_t *number, size_t count, const uint8_t *wrong) {
         const float left = float(view_.left(block * kCount)), top = float(view_.top(block * kCount));

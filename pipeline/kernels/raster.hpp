@@ -43,9 +43,9 @@ class Raster {
         bins.wanted.clear();
     }
 
-    /// Draws the tiles that are wrong into a picture (H, W, 3), linear RGB; how many of them still are. For those,
-    /// strands are to be added once more.
-    int compose(const Backdrop &back, const PointShader &shader, float *picture, int threads) {
+    /// Draws the tiles that are wrong, linear RGB; how many of them still are. For those, strands are to be added once
+    /// more.
+    int compose(const Backdrop &back, const PointShader &shader, const Pictures &pictures, int threads) {
         std::vector<TilePixels> lacking(view.tiles(), TilePixels::none());
         std::vector<size_t> begin;
         const std::vector<uint32_t> segments = sorted_by_block(begin, threads);
@@ -53,11 +53,11 @@ class Raster {
         size_t points = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : count, points)
         {
-            auto painter = std::make_unique<Painter>(view, back, bins, shader);
+            auto painter = std::make_unique<Painter>(view, back, bins, shader, pictures);
 #pragma omp for schedule(dynamic, 1)
             for (int block = 0; block < view.across() * view.down(); ++block)
                 count += painter->block(block, segments.data() + begin[block], begin[block + 1] - begin[block], wrong.data(),
-                                        lacking.data(), picture);
+                                        lacking.data());
             points = painter->shaded;
         }
         shaded += points;

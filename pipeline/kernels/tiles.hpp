@@ -41,7 +41,8 @@ class Tile {
     static constexpr int kWindow = 2;
     static constexpr float kClosed = 1.0f / 256;
 
-    Tile(const View &view, const Backdrop &back) : view_(view), back_(back) {}
+    /// With names, notes which segment takes most of each pixel.
+    Tile(const View &view, const Backdrop &back, bool names) : view_(view), back_(back), names_(names) {}
 
     /// Starts a tile, of which these pixels are wanted.
     void begin(int tile, const TilePixels &wanted) {
@@ -51,6 +52,7 @@ class Tile {
         open_count_ = kPixels;
         std::memset(window_, 0, sizeof window_);
         std::memset(colour_, 0, sizeof colour_);
+        std::memset(most_, 0, sizeof most_);
         for (int p = 0; p < kPixels; ++p) {
             const int x = left_ + p % kTile, y = top_ + p / kTile;
             T_[p] = splat(1.0f), clear_[p] = 1;
@@ -119,14 +121,29 @@ class Tile {
         }
     }
 
+    /// Calls visit(x, y, number) for the pixels that were drawn: `number` of the segment that takes most, -1 if none.
+    template <class Visit> void name(Visit &&visit) const {
+        for (int p = 0; p < kPixels; ++p) {
+            const int x = left_ + p % kTile, y = top_ + p / kTile;
+            if (x < view_.W && y < view_.H && drawn_.has(p % kTile, p / kTile)) visit(x, y, most_[p].part > 0 ? int(most_[p].number) : -1);
+        }
+    }
+
   private:
+    struct Most {
+        float part;
+        uint32_t number;
+    };
+
     const View &view_;
     const Backdrop &back_;
+    const bool names_;
     int left_ = 0, top_ = 0; // [px]
     Cells T_[kPixels];
     float clear_[kPixels], colour_[kPixels][3];  // mean of T; linear RGB
     float nearest_[kPixels], farthest_[kPixels]; // depth of the backdrop
     uint64_t window_[kPixels][kWindow];          // fragments, ascending
+    Most most_[kPixels];
     TilePixels open_, drawn_;
     int open_count_ = 0;
     CellCentres centres_;
@@ -167,6 +184,7 @@ class Tile {
         const float weight = sum_cells(taken) * (1.0f / (kCells * kCells));
         for (int c = 0; c < 3; ++c) colour_[p][c] += weight * (s.colour[c] + at.t * s.gain[c]);
         clear_[p] -= weight;
+        if (names_ && weight > most_[p].part) most_[p] = {weight, uint32_t(held) - 1};
         if (clear_[p] < kClosed) close(p);
     }
 

@@ -25,8 +25,9 @@ from pipeline.render.geometry import (
     smooth_colours,
     taper,
 )
+from pipeline.render.layers import Layers
 from pipeline.render.lighting import Lighting
-from pipeline.render.target import Target
+from pipeline.render.target import DECODED, Target, encode
 from pipeline.render.tone import CURVES, Pixels, average, develop
 from pipeline.render.view import Place, View
 from pipeline.strands.expand import Expansion, MovedSkin
@@ -109,6 +110,7 @@ class FrameRenderer:
         # Exposure and tone curve apply to what is lit; the background is meant as it is written.
         background = CURVES[render.tone].linear(np.array(scene.background)) / render.gain
         self.target = Target(across, down, tuple(background.tolist()))
+        self.background = DECODED[encode(background)]
         self._coverage = Coverage(self.target, render.size)
         self._widths = np.zeros((0, 0), np.float32)
 
@@ -172,10 +174,17 @@ class FrameRenderer:
         pictures = [self._picture(moment, camera, shape, pixels) * np.float32(part) for shape, part in parts]
         return np.asarray(pictures[0] + pictures[1])
 
+    def layers(self, moment: Moment, view: View) -> Layers:
+        """What the picture shows besides colours that `linear` has just given of this moment."""
+        if moment is not self._now.moment:
+            raise ValueError("layers are those of the moment that was rendered last")
+        self._clear(moment, view)
+        self._draw_head(moment, view.position)
+        return self._coverage.layers(self._drawn, view)
+
     def _picture(self, moment: Moment, camera: View, shape: Shape, pixels: float) -> Linear:
         """The linear picture with all strands drawn in one shape, which are so wide [px]."""
-        lower, upper = _bounds(moment)
-        self.target.clear(camera, *self._depths(camera, self._corners(moment, lower, upper)))
+        self._clear(moment, camera)
         coverage = self._coverage if shape == "coverage" else None
         if coverage is not None:
             coverage.begin(camera)
@@ -194,6 +203,9 @@ class FrameRenderer:
         for first, points in self._now.chunks:
             self._draw_strands(shape, camera.position, first, points, veil.visible(points))
         return average(self.target.read(), self.render.samples)
+
+    def _clear(self, moment: Moment, camera: View) -> None:
+        self.target.clear(camera, *self._depths(camera, self._corners(moment, *_bounds(moment))))
 
     def _light(self, to: "_Lit", moment: Moment, coverage: Coverage | None) -> None:
         """First pass: all strands into the density grid."""

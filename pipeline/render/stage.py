@@ -1,31 +1,35 @@
-"""Stage 4, the frames: reads groom.h5, guides.h5 and strands.h5, writes frames/0001.png and so on.
+"""Stage 4, the frames: reads groom.h5, guides.h5 and strands.h5, writes frames/0001.png and so on, and 0001.exr if wanted.
 
 Every PNG says in its text chunks which key it was made from, by which libraries, and the fingerprint of the
 renderer: under one fingerprint the same key gives the same pixels.
 """
 
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline import cache, kernels
 from pipeline.body.normals import point_curvature
+from pipeline.cache import exr
 from pipeline.cache.expansion import body_frames, distance_field, expansion_from, placement
 from pipeline.config import Config, provenance
 from pipeline.progress import say, track
 from pipeline.render.body import DrawnBody
 from pipeline.render.camera import CameraPath
 from pipeline.render.frame import FrameRenderer, Linear, Moment, Skin
+from pipeline.render.layers import Layers
 from pipeline.render.passes import mean, passes
 from pipeline.render.target import Target
 from pipeline.render.tone import Pixels
+from pipeline.render.view import View
 
 
 def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequence[int] = ()) -> None:
@@ -40,6 +44,8 @@ def execute(config: Config, experiment: cache.Experiment, key: str, frames: Sequ
 @contextmanager
 def open_frames(config: Config, experiment: cache.Experiment, key: str) -> Iterator["Frames"]:
     """Open what all frames of an experiment share; they can then be rendered in any portions. Raises as `execute`."""
+    if config.render.exr:
+        exr.library()
     with cache.open(experiment.groom, "groom") as groom, cache.open(experiment.strands, "strands") as strands:
         expansion = expansion_from(groom, strands, config)
         keys = strands["strands/key"][:]
@@ -77,13 +83,12 @@ class Frames:
                 if name != shape:
                     say("render", f"strands are {name}, {wide:.2g} px wide, from frame {number} on")
                     shape = name
-                linear = mean(
-                    self.renderer.linear(moments.at(number, shot.back), shot.view) for shot in shots
-                )
+                seen = ((moments.at(number, shot.back), shot.view) for shot in shots)
+                linear, layers = _mean_of(self.renderer, seen)
                 if writing is not None:
                     writing.result()
                 texts = {"geometry": name, "fingerprint": fingerprint(self.renderer.target)}
-                writing = pool.submit(self._write, number, linear, texts)
+                writing = pool.submit(self._write, number, linear, layers, texts)
                 bar.advance()
             if writing is not None:
                 writing.result()
@@ -92,8 +97,27 @@ class Frames:
         order = [(number, shot.back) for number in numbers for shot in passes(self.config, self.path, number)]
         return Moments(list(dict.fromkeys(order)), self.source, self.renderer)
 
-    def _write(self, number: int, linear: Linear, texts: dict[str, str]) -> None:
+    def _write(self, number: int, linear: Linear, layers: Layers | None, texts: dict[str, str]) -> None:
+        if layers is not None:
+            self.pictures.write_layers(number, layers.channels(linear, self.renderer.background), texts)
         self.pictures.write(number, self.renderer.developed(linear), texts)
+
+
+def _mean_of(renderer: FrameRenderer, shots: Iterable[tuple[Moment, View]]) -> tuple[Linear, Layers | None]:
+    """The mean of some views, linear (H, W, 3), and its layers where the config wants them."""
+    if not renderer.render.exr:
+        return mean(renderer.linear(*shot) for shot in shots), None
+    strands: list[NDArray[np.uint32]] = []
+
+    def both() -> Iterator[Linear]:
+        for shot in shots:
+            linear, layers = renderer.linear(*shot), renderer.layers(*shot)
+            if not strands:
+                strands.append(layers.strand)
+            yield np.concatenate([linear, layers.planes], axis=2)
+
+    planes = mean(both())
+    return planes[..., :3], Layers(planes[..., 3:], strands[0])
 
 
 class Moments:
@@ -154,9 +178,17 @@ class Pictures:
 
     def write(self, number: int, picture: Pixels, texts: dict[str, str]) -> None:
         """Write a frame with its key, what it was made from and `texts`. Raises InputError when the disk is full."""
+        path, texts = self._named(number, ".png", texts)
+        cache.write_picture(path, picture, self._key, self._record, **texts)
+
+    def write_layers(self, number: int, channels: Mapping[str, NDArray[Any]], texts: dict[str, str]) -> None:
+        """Write the layers of a frame in the same way."""
+        path, texts = self._named(number, ".exr", texts)
+        cache.write_layers(path, channels, self._key, self._record, **texts)
+
+    def _named(self, number: int, suffix: str, texts: dict[str, str]) -> tuple[Path, dict[str, str]]:
         self._folder.mkdir(parents=True, exist_ok=True)
-        texts = self._texts | {"frame": str(number)} | texts
-        cache.write_picture(self._folder / f"{number:04d}.png", picture, self._key, self._record, **texts)
+        return self._folder / f"{number:04d}{suffix}", self._texts | {"frame": str(number)} | texts
 
 
 def fingerprint(target: Target) -> str:

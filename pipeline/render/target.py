@@ -17,6 +17,7 @@ Colours = NDArray[np.float32]
 Points = NDArray[np.float32]
 
 BRIGHTEST = 4.0  # linear value that 255 stands for
+NOTHING = 2.0  # depth where nothing is drawn
 _TUBES = 4096  # strands that are tubes at once: VTK's take 20 times the memory of their points
 _MARGIN = 1e-3  # [m] between what is drawn and the clipping planes
 
@@ -128,7 +129,7 @@ class Target:
         values = self._vtk.vtkFloatArray()
         self._window.GetZbufferData(0, 0, self.width - 1, self.height - 1, values)
         depth = np.array(np.asarray(vtk_to_numpy(values)).reshape(self.height, self.width)[::-1])
-        depth[depth >= 1] = 2
+        depth[depth >= 1] = NOTHING
         return depth
 
     def matrix(self) -> NDArray[np.float64]:

@@ -1,6 +1,10 @@
 """Nothing pops or flickers: in a zoom from shape to shape, under a camera that moves, in hair that moves."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from test_render_frame import config, expansion
 
@@ -61,3 +65,80 @@ def test_nothing_pops_in_a_zoom_from_coverage_to_tubes() -> None:
     print(f"auto {np.round(changes['auto'], 4)}, one shape {usual:.4f} at most, a switch would be {pop:.4f}")
     assert max(changes["auto"]) < 1.25 * usual
     assert pop > 2 * usual, "the test would see a switch"
+
+
+def flicker(pictures: list[Points], truths: list[Points]) -> float:
+    """Part of the contrast that flickers: what varies over time of the differences from the truth."""
+    wrong = np.stack(pictures) - np.stack(truths)
+    varying = wrong - wrong.mean(axis=0)
+    return float(varying.std() / np.stack(truths).std())
+
+
+def reduced(picture: Points, times: int) -> Points:
+    """Means over times x times pixels."""
+    height, width, _ = picture.shape
+    return picture.reshape(height // times, times, width // times, times, 3).mean(axis=(1, 3))
+
+
+def sequence(views: list[View], sways: list[float], scale: int = 1, unstable: bool = False) -> list[Points]:
+    """Linear pictures of the swaying lock; with an unstable hash, every frame has other random keys."""
+    drawing = renderer(size=(120 * scale, 120 * scale), width=2e-4, samples=1)
+    pictures = []
+    for number, (view, sway) in enumerate(zip(views, sways, strict=True)):
+        if unstable:
+            drawing.key = drawing.key * np.uint32(2654435761) + np.uint32(number)
+        pictures.append(reduced(drawing.linear(Moment(lock(sway), np.eye(4)), view), scale))
+    drawing.target.close()
+    return pictures
+
+
+@pytest.mark.parametrize("moving", ["camera", "hair"])
+def test_no_flicker_but_that_of_the_truth_at_four_times_the_resolution(moving: str) -> None:
+    """A pixel is 0.6 mm: the camera moves by a third of one a frame, hair tips by half of one."""
+    frames, pixel = 6, 0.2 * 2 * np.tan(0.175) / 120
+    still = from_distance(0.2)
+    shifts = [
+        i * pixel * np.array([0.3, 0.11, 0]) if moving == "camera" else np.zeros(3) for i in range(frames)
+    ]
+    views = [replace(still, position=still.position + by, look_at=still.look_at + by) for by in shifts]
+    sways = [0.5 * pixel * i if moving == "hair" else 0.0 for i in range(frames)]
+    truth = sequence(views, sways, scale=4)
+    found = flicker(sequence(views, sways), truth)
+    unstable = flicker(sequence(views, sways, unstable=True), truth)
+    print(
+        f"moving {moving}: {100 * found:.2f} % of the contrast flickers, {100 * unstable:.0f} % with an unstable hash"
+    )
+    assert found < 0.025
+    assert unstable > 2.5 * found
+
+
+def test_hair_that_moves_as_a_whole_with_the_camera_keeps_its_light() -> None:
+    """The truth is the first picture: neither voxels nor random numbers may swim over the strands."""
+    still, pictures = from_distance(0.2), []
+    drawing = renderer(width=2e-4, samples=1)
+    moves = [i * np.array([3.7e-3, -2.1e-3, 1.3e-3]) for i in range(8)]
+    for by in moves:
+        view = replace(still, position=still.position + by, look_at=still.look_at + by)
+        pose = np.eye(4)
+        pose[:3, 3] = by
+        pictures.append(drawing.linear(Moment((lock() + by).astype(np.float32), pose), view))
+    drawing.target.close()
+    found = flicker(pictures, [pictures[0]] * len(pictures))
+    changes = [apart(a, b) for a, b in pairwise(pictures)]
+    print(f"{100 * found:.2f} % of the contrast flickers; from frame to frame {np.round(changes, 4)}")
+    assert found < 0.03
+
+
+def test_light_does_not_jump_where_the_voxels_are_laid_anew() -> None:
+    """Hair that grows out of the bounds of its voxels gets wider ones, in whole steps of 2 cm."""
+    sways = np.linspace(0, 0.05, 2001)
+    sides = [np.ceil(lock(sway)[..., 0].max() / 0.02) for sway in sways]
+    first = next(i for i in range(2000) if sides[i + 1] != sides[i])
+    drawing, still = renderer(width=2e-4, samples=1), from_distance(0.2)
+    pictures = [drawing.linear(Moment(lock(sways[i]), np.eye(4)), still) for i in range(first - 1, first + 3)]
+    drawing.target.close()
+    changes = [apart(a, b) for a, b in pairwise(pictures)]
+    mean = [float(picture.mean()) for picture in pictures]
+    print(f"tips move by 25 um: {np.round(changes, 5)}, anew in the middle; mean light {np.round(mean, 5)}")
+    assert changes[1] < 1.5 * max(changes[0], changes[2])
+    assert abs(mean[2] / mean[1] - 1) < 2e-3
