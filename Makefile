@@ -63,6 +63,17 @@ outputs/$1/targets.mk: $(lastword $(subst |, ,$(filter $1|%,$(ALL)))) $(SOURCES)
 endef
 $(foreach n,$(WANTED),$(eval $(call rules,$n)))
 
+# What times alone do not tell: another file in the place of one (keys/sources holds times and sizes), and files from the
+# future, made before the clock went back. Either asks for new keys.
+ifeq ($(MAKE_RESTARTS),)
+UNSETTLED := $(shell for folder in $(WANTED:%=outputs/%); do [ -f $$folder/keys/sources ] || continue; \
+  cut -d' ' -f3- $$folder/keys/sources | tr '\n' '\0' | xargs -0 stat -c '%.9Y %s %n' 2>/dev/null \
+    | cmp -s - $$folder/keys/sources && [ -z "$$(find $$folder/targets.mk $$folder/keys $$folder/*.h5 $$folder/frames \
+    -type f -newermt '2 seconds' -print -quit 2>/dev/null)" ] || echo $$folder/targets.mk; done)
+$(UNSETTLED): unsettled
+.PHONY: unsettled
+endif
+
 include $(WANTED:%=outputs/%/targets.mk)
 
 .PHONY: $(WANTED) $(WANTED:%=outputs/%)

@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import os
+import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -62,6 +64,8 @@ def write_stamps(config: Path, loaded: Loaded, experiment: Experiment) -> None:
     runs = load_sweep(config).runs if loaded.config.sweep else ()
     batches = [batch_of(run, experiment.folder.parent) for run in runs]
     keys = batch.keys | ({"sweep": _together(batches)} if batches else {})
+    products = [path for each in (batch, *batches) for stage in STAGES for path in each.outputs(stage)]
+    _settle([*products, experiment.report, *(_stamp(experiment, stage) for stage in keys)])
     for stage, key in keys.items():
         stamp = _stamp(experiment, stage)
         if not stamp.exists() or stamp.read_text() != key:
@@ -69,7 +73,7 @@ def write_stamps(config: Path, loaded: Loaded, experiment: Experiment) -> None:
     sources = dict.fromkeys(
         path for each in (loaded, *(run.loaded for run in runs)) for path in _sources(each)
     )
-    products = [path for each in batches for stage in STAGES for path in each.outputs(stage)]
+    swept = [path for each in batches for stage in STAGES for path in each.outputs(stage)]
     rules = _RULES.format(
         config=_escaped(config),
         folder=_escaped(experiment.folder),
@@ -86,11 +90,27 @@ def write_stamps(config: Path, loaded: Loaded, experiment: Experiment) -> None:
             folder=_escaped(experiment.folder),
             stamp=_escaped(_stamp(experiment, "sweep")),
             products=_listed(
-                [*products, *(experiment.folder / f"sweep.{kind}" for kind in ("json", "csv", "html"))]
+                [*swept, *(experiment.folder / f"sweep.{kind}" for kind in ("json", "csv", "html"))]
             ),
         ),
     )
+    _write(experiment.folder / "keys" / "sources", "".join(map(_signature, sources)))
     _write(experiment.folder / "targets.mk", rules)
+
+
+def _settle(paths: Iterable[Path]) -> None:
+    """Take files from the future, made before the clock went back, into the present: no edit would be newer than they are."""
+    now = time.time()
+    for path in paths:
+        if path.exists() and path.stat().st_mtime > now:
+            os.utime(path, (now - 1, now - 1))
+
+
+def _signature(path: Path) -> str:
+    """What `stat -c '%.9Y %s %n'` says of a file, a line."""
+    status = path.stat()
+    seconds, rest = divmod(status.st_mtime_ns, 10**9)
+    return f"{seconds}.{rest:09d} {status.st_size} {path}\n"
 
 
 def _together(batches: Sequence[Batch]) -> str:

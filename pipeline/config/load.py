@@ -35,6 +35,8 @@ FILES: dict[
     ("simulate", "tips_file"): (),
 }
 
+_DEEPEST = 32  # levels of tables and lists in a config
+
 SEQUENCES: tuple[tuple[str, ...], ...] = (("scene", "body"),)  # keys that name numbered files
 
 
@@ -126,10 +128,7 @@ def _read(path: Path, files: list[Path], roots: tuple[Path, ...]) -> Tree:
         raise InputError(f"{files[-1]}: extends: goes round in circles: {chain}")
     files.append(path)
     text = _text(path)
-    try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(_syntax(path, text, str(error))) from None
+    values = _parsed(path, text)
     lines = {key: f"{path}:{line}" for key, line in key_lines(text).items()}
     values.setdefault("name", path.stem)
     own = Tree(values, lines)
@@ -151,6 +150,31 @@ def _read(path: Path, files: list[Path], roots: tuple[Path, ...]) -> Tree:
     tree = _read(parent, files, roots)
     tree.update(own)
     return tree
+
+
+def _parsed(path: Path, text: str) -> dict[str, Any]:
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(_syntax(path, text, str(error))) from None
+    except ValueError as error:  # numbers of thousands of digits
+        raise InputError(f"{path}: not a config: {error}") from None
+    except RecursionError:
+        values = None
+    if values is None or not _shallow(values):
+        raise InputError(f"{path}: values within values more than {_DEEPEST} levels deep; no config is")
+    return values
+
+
+def _shallow(values: Any) -> bool:
+    """Whether nothing lies deeper than `_DEEPEST` levels."""
+    level = [values]
+    for _ in range(_DEEPEST):
+        tables = [inner for inner in level if isinstance(inner, dict | list)]
+        level = [item for inner in tables for item in (inner.values() if isinstance(inner, dict) else inner)]
+        if not level:
+            return True
+    return False
 
 
 def _text(path: Path) -> str:
@@ -189,7 +213,7 @@ def _scalar(value: str) -> Any:
     """Read a TOML value; what is none is a string, so that quotes are not needed in a shell."""
     try:
         return tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return value
 
 

@@ -97,10 +97,10 @@ template <class Real> struct Block {
     Lanes<Real> k_kappa_2, k_ratio, inverse_ratio; // "kirchhoff": B2, B2 / B1, B1 / B2
     Lanes<Real> theta{};                           // implicitness, see implicitness.hpp
     Lanes<Real> root_kappa, root_kappa_2, root_tau; // square roots of k_kappa, k_kappa_2, k_tau
-    Vec3<Real> *anchor;                 // rest position of a point
+    Vec3<Real> *anchor;                 // rest position of a point; valid where some lane holds it, and at the root
     Lanes<Real> root_bend[2], root_weight;    // root.hpp; weight 0 unless the head holds points 0 and 1
     Vec3<Real> *load;                   // constant force on a point over m0
-    Vec3<Real> *director, *strain;      // "kirchhoff": of segment j; (r1, r2, r3) at point i
+    Vec3<Real> *director, *strain;      // "kirchhoff": of segment j, valid as `anchor`; (r1, r2, r3) at point i
     Lanes<Real> *turns;                 // 1 where the director of segment j is free: not both its ends are held
     Lanes<Real> *l, *dl;                // length of segment j; mean length of the segments beside point i
     Lanes<Real> *inverse_l, *inverse_dl, *root_dl; // 1 / l, 1 / dl, sqrt(dl)
@@ -258,12 +258,21 @@ template <class Real> void read_curves(Block<Real> &b, const RestShape &rest, co
     }
 }
 
+/// Reads rest positions and directors, as far along as some lane holds a point, and at the root.
+template <class Real>
+void read_anchors(Block<Real> &b, const RestShape &rest, const int (&strand)[kLanes<Real>]) {
+    int count = 6; // these lie in one row, or two in float64, and the root's first two segments among them
+    for (int i = count; i < b.P; ++i)
+        if (any<Real>(b.free[i] < splat(Real(1)))) count = i + 1;
+    gather<Real>(&b.anchor->x, rest.points.data(), 3 * count, 3 * b.P, strand);
+    gather<Real>(&b.director->x, rest.directors.data(), 3 * std::min(count, b.P - 1), 3 * (b.P - 1), strand);
+}
+
 /// Reads the rest shape of a block of strands; without curves, what "kirchhoff" needs.
 template <class Real>
 void read(Block<Real> &b, const RestShape &rest, const BlockIndex<Real> &index, bool curves = true) {
     const int P = b.P;
     const auto &strand = index.strand;
-    gather(b.anchor, rest.points.data(), P, strand);
     gather<Real>(b.l, rest.length.data(), P - 1, P - 1, strand);
     gather<Real>(b.mu, rest.mass.data(), P, P, strand);
     gather<Real>(b.offset, rest.offset.data(), P, P, strand);
@@ -278,10 +287,10 @@ void read(Block<Real> &b, const RestShape &rest, const BlockIndex<Real> &index, 
     b.root_kappa = square_root<Real>(b.k_kappa), b.root_kappa_2 = square_root<Real>(b.k_kappa_2);
     b.root_tau = square_root<Real>(b.k_tau);
     gather(b.load, rest.load.data(), P, strand);
-    gather(b.director, rest.directors.data(), P - 1, strand);
     gather(b.strain + 1, rest.strain.data(), P - 2, strand);
     if (curves) read_curves(b, rest, strand);
     derive(b, rest, strand);
+    read_anchors(b, rest, strand);
     derive_root(b);
 }
 

@@ -54,8 +54,9 @@ template <class Real> struct HeadStep {
     __attribute__((noinline)) void measure(Vec3<Real> at, Mask<Real> &last, Corners<Real> &corners, L &phi,
                                            Vec3<Real> &gradient) const {
         const Cells<Real> cells(*field, at);
-        if (any<Real>(cells.at != last)) {
-            corners.read(*field, cells.at);
+        const Mask<Real> changed = cells.at != last;
+        if (any<Real>(changed)) {
+            corners.read(*field, cells.at, changed);
             last = cells.at;
         }
         corners.interpolate(cells, phi, gradient);

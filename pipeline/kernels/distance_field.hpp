@@ -94,12 +94,22 @@ template <class Real> struct Cells {
 
 /// The distances at the eight corners of cells; the last axis goes fastest.
 template <class Real> struct Corners {
+    static constexpr int kFew = kLanes<Real> / 4;
     Lanes<Real> value[8];
 
-    /// Reads those of cells.
-    __attribute__((noinline)) void read(const DistanceField &field, Mask<Real> at) {
+    /// Reads those of cells, for lanes whose cell has changed: one by one where they are few.
+    __attribute__((noinline)) void read(const DistanceField &field, Mask<Real> at, Mask<Real> changed) {
         const int nz = field.n[2], row = field.n[1] * nz;
         const float *values = field.values.data();
+        uint32_t left = set_lanes<Real>(changed);
+        if (__builtin_popcount(left) <= kFew) {
+            for (; left; left &= left - 1) {
+                const int lane = __builtin_ctz(left);
+                const float *first = values + at[lane];
+                for (int k = 0; k < 8; ++k) value[k][lane] = Real(first[(k >> 2) * row + (k >> 1 & 1) * nz + (k & 1)]);
+            }
+            return;
+        }
         gather_pairs<Real>(values, at, value[0], value[1]);
         gather_pairs<Real>(values + nz, at, value[2], value[3]);
         gather_pairs<Real>(values + row, at, value[4], value[5]);
@@ -126,7 +136,7 @@ template <class Real>
 __attribute__((noinline)) void sample(const DistanceField &field, Vec3<Real> x, Lanes<Real> &phi, Vec3<Real> &gradient) {
     const Cells<Real> cells(field, x);
     Corners<Real> corners;
-    corners.read(field, cells.at);
+    corners.read(field, cells.at, Mask<Real>{} - 1);
     corners.interpolate(cells, phi, gradient);
 }
 

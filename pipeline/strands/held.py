@@ -8,6 +8,7 @@ as text (.csv) or as a numpy array (.npy).
 """
 
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,6 +64,7 @@ def read_held(path: Path, strands: int, points: int) -> Mask:
 
 def _read_npy(path: Path) -> NDArray[np.float64]:
     try:
-        return np.asarray(np.load(path, allow_pickle=False), np.float64)
-    except (OSError, ValueError, EOFError) as error:
+        mapped = np.load(path, mmap_mode="r", allow_pickle=False)  # a file shorter than it says is refused
+        return np.asarray(mapped, np.float64)
+    except (OSError, ValueError, EOFError, TypeError, SyntaxError, TokenError, MemoryError) as error:
         raise InputError(f"{path}: not a numpy array of numbers ({error})") from None

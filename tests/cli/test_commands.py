@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -274,6 +275,19 @@ def test_an_interrupted_run_leaves_whole_files(tmp_path: Path, signal: str, code
     assert err.splitlines()[-1].startswith(f"ringlet: stopped by SIG{signal}; what is finished stays")
     assert "Traceback" not in err
     assert sorted(path.name for path in (tmp_path / "x").iterdir()) == ["locks", "log.jsonl"]
+
+
+def test_every_exit_code_is_in_the_help_and_in_the_docs(capsys: pytest.CaptureFixture[str]) -> None:
+    from pipeline import errors
+
+    codes = {errors.DONE, errors.FAILED, errors.WRONG_INPUT, errors.FAULT, 129, 130, 143}
+    assert call(["--help"]) == 0
+    told = capsys.readouterr().out.partition("Exit codes:")[2]
+    rows = [line for line in (ROOT / "docs" / "operating.md").read_text().splitlines() if line[:1] == "|"]
+    table = " ".join(line.split("|")[1] for line in rows)
+    for code in codes:
+        assert re.search(rf"\b{code}\b", told), code
+        assert re.search(rf"\b{code}\b", table), code
 
 
 def test_json_knows_no_nan(capsys: pytest.CaptureFixture[str]) -> None:

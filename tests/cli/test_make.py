@@ -126,6 +126,41 @@ def test_editing_the_simulation_reruns_what_follows_from_it(rendered: Project) -
     assert rendered.make("render") == ["simulate", "render 1 2 3"]
 
 
+def test_a_clock_that_went_back_hides_no_edit(rendered: Project) -> None:
+    """All that was made is of tomorrow; make, which compares times, would take no edit of today for newer."""
+    tomorrow = time.time() + 86400
+    for path in (rendered.folder / "outputs").rglob("*"):
+        os.utime(path, (tomorrow, tomorrow))
+    rendered.write("default", BASE.replace("samples = 1", "samples = 2"))
+    assert rendered.make("render") == ["render 1 2 3"]
+    assert rendered.make("render") == []
+    assert rendered.log() == []
+    rendered.frame(2).unlink()
+    assert rendered.make("render") == ["render 2"]
+    assert rendered.make("render") == []
+    assert rendered.log() == []
+
+
+def test_a_clock_that_went_back_alone_reruns_nothing(rendered: Project) -> None:
+    for path in (rendered.folder / "outputs").rglob("*"):
+        os.utime(path, (time.time() + 86400,) * 2)
+    assert rendered.make("render") == []
+    assert rendered.make("render") == []
+    assert rendered.log() == []
+
+
+@pytest.mark.parametrize("age", [0, 10 * 365 * 86400], ids=["same time", "older"])
+def test_another_file_in_the_place_of_the_config_is_an_edit(rendered: Project, age: int) -> None:
+    """As `mv` and `cp -p` leave it: with a time at which make looks in vain."""
+    config = rendered.folder / "configs" / "default.toml"
+    then = config.stat().st_mtime - age
+    rendered.write("default", BASE.replace("samples = 1", "samples = 2 # finer"))
+    os.utime(config, (then, then))
+    assert rendered.make("render") == ["render 1 2 3"]
+    assert rendered.make("render") == []
+    assert rendered.log() == []
+
+
 def test_deleting_one_picture_remakes_only_that_picture(rendered: Project) -> None:
     rendered.frame(2).unlink()
     assert rendered.make("render") == ["render 2"]

@@ -297,7 +297,7 @@ HARM = {  # what a library may do instead of reading, and what the message must 
     "crashed (SIGSEGV)": "import ctypes; ctypes.string_at(0)",
     "crashed (SIGABRT)": "import os; os.abort()",
     "takes more than": "x = bytearray(1 << 36)",
-    "took more than 5 s": "import signal; signal.raise_signal(signal.SIGXCPU)",
+    "took more than 4 s": "import signal; signal.raise_signal(signal.SIGXCPU)",
     "cannot be read (KeyError: 5)": "import resource as r; {}[r.getrlimit(r.RLIMIT_CPU)[0]]",
     "cannot be read (KeyError: 2147483648)": "import resource as r; {}[r.getrlimit(r.RLIMIT_AS)[0]]",
     "cannot be read (KeyError: 'x')": "{}['x']",

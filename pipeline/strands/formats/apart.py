@@ -25,7 +25,7 @@ REFUSED = 3  # exit code of a child that says what is wrong with the file
 
 _GB = 1 << 30
 _MEMORY, _MEMORY_PER_BYTE = 2 * _GB, 64  # the library's own, and for each byte of the file
-_SECONDS, _BYTES_PER_SECOND = 5, 2e6
+_SECONDS, _BYTES_PER_SECOND = 4, 2e6
 _PATIENCE = 12  # elapsed seconds for each second of processor time: other processes need theirs
 _FEW_THREADS = {
     "MALLOC_ARENA_MAX": "2",
