@@ -149,9 +149,9 @@ class Batch:
             with cache.open(path, _KINDS[stage]) as reader:
                 if reader.key != self.keys[stage]:
                     return self._difference(stage, reader.provenance)
-                if _identity(path) not in _verified:
+                if identity(path) not in _verified:
                     reader.verify()
-                    _verified[_identity(path)] = reader.key
+                    _verified[identity(path)] = reader.key
                 return None
         except cache.Missing:
             return "not made yet"
@@ -170,10 +170,10 @@ class Batch:
         stale: dict[int, str] = {}
         for number, path in ((n, path) for n in frames for path in self._files(n)):
             try:
-                if path.exists() and _verified.get(_identity(path)) == self.keys["render"]:
+                if path.exists() and _verified.get(identity(path)) == self.keys["render"]:
                     continue
                 key, provenance = cache.picture_record(path)
-                _verified[_identity(path)] = key
+                _verified[identity(path)] = key
                 if key != self.keys["render"]:
                     stale[number] = self._difference("render", provenance)
             except cache.Missing:
@@ -188,7 +188,7 @@ class Batch:
         return State("render", "; ".join(reasons), tuple(sorted(missing | stale.keys())))
 
 
-def _identity(path: Path) -> tuple[int, ...]:
+def identity(path: Path) -> tuple[int, ...]:
     """What tells apart files, and states of a file, but for its name: experiments share files by hard links."""
     status = path.stat()
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
@@ -196,7 +196,7 @@ def _identity(path: Path) -> tuple[int, ...]:
 
 def _touch(path: Path) -> None:
     """Give a file the current time, without having to verify it again."""
-    key = _verified.get(_identity(path))
+    key = _verified.get(identity(path))
     os.utime(path)
     if key is not None:
-        _verified[_identity(path)] = key
+        _verified[identity(path)] = key

@@ -181,6 +181,21 @@ def bench_render(
     _report(found, json)
 
 
+@bench.command(name="farm")
+def bench_farm(
+    *,
+    frames: Count = 96,
+    workers: Count = 2,
+    size: Annotated[int, Parameter(help="Width and height [px].")] = 256,
+    strands: Count = 4000,
+    json: Json = False,
+) -> None:
+    """Frames by one worker and by several: efficiency, and what a frame costs more."""
+    from pipeline.farm.bench import bench
+
+    _report(bench(frames, workers, size, strands), json)
+
+
 @bench.command(name="render-table")
 def bench_render_table(
     *,

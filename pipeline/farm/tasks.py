@@ -6,16 +6,20 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline import kernels, log
-from pipeline.batch.stages import NEEDS, Batch
+from pipeline.batch.stages import NEEDS, Batch, identity
 from pipeline.cache import Experiment
 from pipeline.config import Config
 from pipeline.errors import FAULT, InputError, verdict
+
+if TYPE_CHECKING:
+    from pipeline.render.stage import Frames
 
 TOPIC = "ringlet"
 THREADS = "RINGLET_THREADS"  # environment variable: how many threads the kernels of a worker have
@@ -45,7 +49,7 @@ class Job:
 
     def batch(self) -> Batch:
         """Its stages, as this process sees them; raises InputError when it sees other files or another program."""
-        batch = Batch(Config.model_validate_json(self.config), Experiment(Path(self.folder)))
+        batch = _WorkersBatch(Config.model_validate_json(self.config), Experiment(Path(self.folder)))
         if tuple(batch.keys.items()) != self.keys:
             raise InputError(
                 f"worker on {socket.gethostname()}: its ringlet, or a file that the config names, is not the same "
@@ -67,6 +71,47 @@ class Outcome:
     """What went wrong, mostly for the user to mend; later tasks pass it on."""
     fault: str = ""
     """Where, if it is a fault of ringlet."""
+
+
+class _WorkersBatch(Batch):
+    """Keeps the last experiment whose frames it has rendered open, for the next chunk of them."""
+
+    def execute(self, stage: str, frames: tuple[int, ...]) -> None:
+        """Run the code of a stage."""
+        if stage != "render":
+            _kept.close()
+            super().execute(stage, frames)
+            return
+        _kept.frames_of(self).render(frames)
+
+
+class _Kept(threading.local):
+    """An open renderer, of the thread that draws by it."""
+
+    def __init__(self) -> None:
+        self._what: tuple[Any, ...] = ()
+        self._open = ExitStack()
+        self._frames: Frames | None = None
+
+    def frames_of(self, batch: Batch) -> "Frames":
+        """The frames of an experiment; opens them where its files are others than the last ones."""
+        from pipeline.render.stage import open_frames
+
+        files = [identity(batch.file(stage)) for stage in NEEDS["render"]]
+        what = (batch.keys["render"], batch.experiment.folder, *files)
+        if self._frames is None or self._what != what:
+            self.close()
+            opened = open_frames(batch.config, batch.experiment, batch.keys["render"])
+            self._frames, self._what = self._open.enter_context(opened), what
+        return self._frames
+
+    def close(self) -> None:
+        """Give the memory back."""
+        self._frames = None
+        self._open.close()
+
+
+_kept = _Kept()
 
 
 def make_stage(job: Job, stage: str, after: Sequence[Outcome]) -> Outcome:
@@ -105,6 +150,7 @@ def _guarded(job: Job, after: Sequence[Outcome], work: Callable[[], int]) -> Out
         try:
             made = work()
         except Exception as wrong:  # noqa: BLE001, told where the run was started
+            _kept.close()
             code, error = verdict(wrong)
             fault = traceback.format_exc() if code == FAULT else ""
     return Outcome(time.monotonic() - start, socket.gethostname(), kernels.VARIANT, made, error, fault)

@@ -39,7 +39,7 @@ struct Batch {
     static constexpr int kBits = 16;
 
     Span<SeenPoint> seen;
-    Span<Entry> entries;
+    std::vector<Entry> entries; // until they are sorted by blocks
     Span<float> points, absorption; // (n, P, 3) and (n, 3) of the n strands of which something is seen
     Span<uint32_t> key;             // (n,)
 };
@@ -54,7 +54,7 @@ struct OpenBatch {
     void clear() { seen.clear(), entries.clear(), points.clear(), absorption.clear(), key.clear(); }
 
     Batch store(Arena &arena) const {
-        return {arena.copy(seen), arena.copy(entries), arena.copy(points), arena.copy(absorption), arena.copy(key)};
+        return {arena.copy(seen), std::vector<Entry>(entries), arena.copy(points), arena.copy(absorption), arena.copy(key)};
     }
 };
 

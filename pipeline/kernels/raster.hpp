@@ -96,7 +96,7 @@ class Raster {
 #pragma omp parallel for schedule(static, 1) num_threads(threads)
         for (int thread = 0; thread < threads; ++thread)
             for (size_t b = share(thread); b < share(thread + 1); ++b)
-                for (size_t i = 0; i < bins.batches[b].entries.size; ++i) ++next[thread][bins.batches[b].entries[i].block];
+                for (const Entry &entry : bins.batches[b].entries) ++next[thread][entry.block];
         begin.assign(blocks + 1, 0);
         size_t total = 0;
         for (size_t block = 0; block < blocks; ++block) {
@@ -111,8 +111,8 @@ class Raster {
 #pragma omp parallel for schedule(static, 1) num_threads(threads)
         for (int thread = 0; thread < threads; ++thread)
             for (size_t b = share(thread); b < share(thread + 1); ++b) {
-                const Span<Entry> entries = bins.batches[b].entries;
-                for (size_t i = 0; i < entries.size; ++i) segments[next[thread][entries[i].block]++] = entries[i].segment;
+                for (const Entry &entry : bins.batches[b].entries) segments[next[thread][entry.block]++] = entry.segment;
+                bins.batches[b].entries = {};
             }
         return segments;
     }

@@ -4,9 +4,12 @@ tag("p", "1 < 2", class_="note")  ->  <p class="note">1 &lt; 2</p>
 """
 
 import html
+import re
 from collections.abc import Iterable
 from typing import Any
 
+# Control characters, and lone surrogates, which a broken file name has.
+_FORBIDDEN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 _VOID = frozenset({"br", "img", "input", "link", "meta"})
 
 
@@ -20,7 +23,7 @@ def text(value: object) -> Html:
     """Escape anything that is not markup; characters that no document may hold become U+FFFD."""
     if isinstance(value, Html):
         return value
-    return Html(html.escape("".join(map(_allowed, str(value)))))
+    return Html(html.escape(_FORBIDDEN.sub("\ufffd", str(value))))
 
 
 def join(parts: Iterable[object]) -> Html:
@@ -41,10 +44,3 @@ def tag(name: str, /, *children: object, **attributes: Any) -> Html:
 
 def _attribute(key: str) -> str:
     return key.rstrip("_").replace("_", "-")
-
-
-def _allowed(character: str) -> str:
-    """What HTML calls a character: no lone surrogate (a broken file name has some) and no control character."""
-    code = ord(character)
-    control = (code < 32 and character not in "\t\n") or 127 <= code < 160
-    return "\ufffd" if control or 0xD800 <= code < 0xE000 else character

@@ -32,4 +32,4 @@ def shrunk(pixels: Pixels, width: int) -> Pixels:
     if full <= width:
         return pixels
     size = (width, max(round(width * height / full), 1))
-    return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.LANCZOS))
+    return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.LANCZOS, reducing_gap=2.0))

@@ -91,6 +91,7 @@ for (let column = 0; column < table.tHead.rows[0].cells.length; column += 1) {
   if (!table.tHead.rows[0].cells[column].classList.contains("number")) continue;
   const found = values(column).map((value) => Math.abs(Number(value)));
   const most = Math.max(...found) || 1;
+  if (Math.min(...found) === most) continue; // a bar that is the same everywhere tells nothing
   rows.forEach((row, index) => row.cells[column].style.setProperty("--part", `${(100 * found[index]) / most}%`));
 }
 for (const row of rows) {

@@ -25,7 +25,7 @@ from pipeline.pages.plots import number
 FORMAT = 1
 _HERE = Path(__file__).parent
 _WIDTH, _COLUMNS = 320, 6  # of one frame [px]; frames in a row of a film
-_FRAMES, _ALL = 32, 480  # frames of one film, of all films of a page
+_FRAMES, _ALL = 24, 480  # frames of one film, of all films of a page
 
 Row = dict[str, Any]
 

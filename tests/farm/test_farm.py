@@ -225,6 +225,19 @@ def test_a_scheduler_that_is_restarted_goes_on_with_what_is_missing(
     assert_same(found.experiment, serial)
 
 
+def test_experiments_are_tasks_and_share_what_they_have_in_common(
+    begun: Farm, serial: cache.Experiment, tmp_path: Path
+) -> None:
+    first = batch(tmp_path / "outputs")
+    second = batch(tmp_path / "outputs", "name=brighter", "render.exposure=2.0", f"simulate.frames={FRAMES}")
+    report = make([first, second], None, begun.address, frames=range(1, 4))
+    assert report.made == 6
+    assert first.experiment.guides.samefile(second.experiment.guides)
+    made, wanted = pictures(first.experiment), pictures(serial)
+    assert made == {name: wanted[name] for name in made}
+    assert len(made) == len(pictures(second.experiment)) == 3
+
+
 def test_what_the_user_has_to_mend_is_told_as_such(begun: Farm, tmp_path: Path) -> None:
     found = batch(tmp_path / "outputs")
     found.experiment.folder.parent.mkdir()

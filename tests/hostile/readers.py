@@ -144,8 +144,13 @@ def _meshes(folder: Path) -> list[Target]:
 
 
 def _mesh(path: Path) -> object:
-    """In this process, where production has one apart: whatever is raised here is contained there."""
-    return read_mesh(path, painted=True)
+    """In this process, where production has one apart: whatever is raised here is one message there."""
+    try:
+        return read_mesh(path, painted=True)
+    except MemoryError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _pictures() -> list[Target]:

@@ -29,8 +29,8 @@ def shader() -> kernels.FibreShader:
     flat = np.ones(4, np.float32)
     tables = kernels.FibreTables(np.zeros((2, 2, 2, 8), np.float32), sums, flat, 0 * flat, 1.0)
     none, around = np.zeros((0, 3), np.float32), np.ones((2, 2, 2, 8), np.float32)
-    depth = np.zeros((0, 4, 4, 4), np.float32)
-    light = kernels.Illumination(none, none, np.ones(3, np.float32), (depth, depth, depth), around)
+    shadows = kernels.Shadows(none, -np.ones(3), np.ones(3), 0.5, 1e-3)
+    light = kernels.Illumination(none, none, np.ones(3, np.float32), shadows, around)
     return kernels.FibreShader(light, tables, np.array([0.0, 0.0, twin.EYE]))
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from pipeline import cache, kernels
+from pipeline.compare.metrics import measure
 from pipeline.config.schema import Camera, Config, Groom, Render, Scene
 from pipeline.render import chunks
 from pipeline.render.frame import FrameRenderer, Moment, Skin
@@ -139,3 +140,21 @@ def test_a_machine_without_opengl_gets_one_clear_message() -> None:
     assert "InputError: render: no off-screen OpenGL" in result.stderr
     assert "apt-get install -y libegl1 libgl1-mesa-dri" in result.stderr
     assert "vtk" not in result.stderr.replace("pipeline", "").lower().split("inputerror")[1]
+
+
+def test_coverage_looks_as_lines_of_8_x_8_samples() -> None:
+    """Strands an eighth of a pixel wide, which is one sample; several cover one another."""
+    wide = 2 * 0.6 * np.tan(0.2) / 96 / 8
+    random = np.random.default_rng(4)
+    rest = hanging(4000)
+    rest[..., 0] += np.cumsum(random.normal(0, 4e-4, rest.shape[:2]), axis=1).astype(np.float32)
+    rest[..., 2] = random.uniform(-0.01, 0.01, (len(rest), 1))
+    pictures = [
+        render(config(geometry=geometry, width=wide, taper=0, samples=8), rest)
+        for geometry in ("coverage", "lines")
+    ]
+    found = measure(pictures[1], pictures[0])
+    covered = (np.abs(pictures[0].astype(int) - pictures[0][0, 0]).max(axis=2) > 8).mean()
+    print(f"FLIP {found.flip:.4f}, hair in {covered:.0%} of the picture")
+    assert covered > 0.15
+    assert found.flip < 0.03

@@ -5,6 +5,7 @@ the root mean square difference between a pixel and the mean around it over the 
 mean, both of luminance.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ _F64 = NDArray[np.float64]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _REGION = 17  # [px]
+_MOST = 0.35  # of a region that hair must cover
 
 
 @dataclass(frozen=True)
@@ -38,17 +40,17 @@ def compare(ours: _F32, reference: _F32, mask: NDArray[np.bool_], region: int = 
     light = [picture.astype(np.float64) @ LUMINANCE for picture in (ours, reference)]
     weight = uniform_filter(mask.astype(np.float64), region)
     near = [uniform_filter(each * mask, region) / np.maximum(weight, 1e-9) for each in light]
-    well = mask & (weight > 0.5)
+    well = mask & (weight > _MOST)
     r, g, b = (float(x) for x in means[0] / means[1])
     return Likeness(
         (r, g, b),
-        float(np.corrcoef(near[0][well], near[1][well])[0, 1]),
+        float(np.corrcoef(near[0][well], near[1][well])[0, 1]) if well.sum() > 2 else np.nan,
         _pair(_contrast(each, around, mask) for each, around in zip(light, near, strict=True)),
         _pair(float(np.percentile(each[mask], 99) / each[mask].mean()) for each in light),
     )
 
 
-def _pair(values):
+def _pair(values: Iterable[float]) -> tuple[float, float]:
     a, b = values
     return a, b
 

@@ -11,14 +11,15 @@ from pipeline.strands.expand import Binding, Expansion
 from pipeline.validation.pictures.reference import Body, Reference
 
 _F32 = NDArray[np.float32]
+_F64 = NDArray[np.float64]
 
 _SMOOTH = 4  # drawn segments a segment, where a strand has few points: the reference draws smooth curves
 _FEW = 32
 _FIELD = 2e-3  # [m] between the nodes of a body's distance field
 
 
-def render(reference: Reference, every: int = 1, grid: int = 128) -> tuple[_F32, NDArray[np.bool_]]:
-    """Linear RGB (H, W, 3) over black, and which pixels hair covers all of, (H, W).
+def render(reference: Reference, every: int = 1, grid: int = 128) -> tuple[_F32, _F32]:
+    """Linear RGB (H, W, 3) over black, and what part of each pixel hair covers, (H, W).
 
     With `every` 2 the picture is half as wide and high.
     """
@@ -53,23 +54,38 @@ def render(reference: Reference, every: int = 1, grid: int = 128) -> tuple[_F32,
     renderer = FrameRenderer(config, strands, key, skins[0] if skins else None)
     picture = renderer.linear(moment)
     renderer.target.close()
-    silhouette = _Silhouette(config, strands, key, skins[0] if skins else None)
+    silhouette = _Silhouette(_white(config), strands, key, skins)
     covered = silhouette.linear(moment)[..., 0]
     silhouette.target.close()
     return picture, covered
 
 
+def _white(config: Config) -> Config:
+    """White hair under a white sky: it shows as much white as it covers."""
+    scene = config.scene.model_copy(update={"lights": (), "environment": (1.0, 1.0, 1.0)})
+    fibre = config.render.hair.model_copy(update={"melanin": 0.0})
+    render = config.render.model_copy(update={"hair": fibre})
+    return config.model_copy(update={"scene": scene, "render": render})
+
+
 class _Silhouette(FrameRenderer):
-    """Hair in white, everything else in black."""
+    """Hair under its own light, bodies in black that take no part in it."""
 
-    def _shade(self, eye: NDArray[np.float64], first: int, points: _F32, which: NDArray[np.uint32]) -> _F32:
-        return np.ones((len(which), 3), np.float32)
+    def __init__(
+        self, config: Config, strands: Expansion, key: NDArray[np.uint32], bodies: list[Skin]
+    ) -> None:
+        super().__init__(config, strands, key)
+        self._bodies = bodies
 
-    def _draw_head(self, moment: Moment, eye: NDArray[np.float64]) -> None:
-        if self.skin is None:
-            self.target.background()
-        else:
-            self.target.triangles(self.skin.points, self.skin.triangles, np.zeros_like(self.skin.points))
+    def _draw_head(self, moment: Moment, eye: _F64) -> None:
+        del moment, eye  # black bodies that do not move
+        self.target.background()
+        for body in self._bodies:
+            self.target.triangles(body.points, body.triangles, np.zeros_like(body.points))
+
+    def _corners(self, moment: Moment, lower: _F64, upper: _F64) -> _F64:
+        corners = super()._corners(moment, lower, upper)
+        return np.concatenate([corners, *(body.points.astype(np.float64) for body in self._bodies)])
 
 
 def _as_they_are(points: _F32) -> Expansion:

@@ -124,7 +124,7 @@ def _cylinder(radius: float, length: float, albedo: float, sides: int = 256) -> 
     """A cylinder about x, with lids: what is open in the reference no hair looks into."""
     turn = np.arange(sides) * 2 * np.pi / sides
     ring = radius * np.stack([0 * turn, np.cos(turn), np.sin(turn)], axis=-1)
-    ends = [ring + [x, 0, 0] for x in (-length / 2, length / 2)]
+    ends = [ring + np.array([x, 0, 0]) for x in (-length / 2, length / 2)]
     middles = np.array([[-length / 2, 0, 0], [length / 2, 0, 0]])
     i = np.arange(sides)
     j, left, right = (i + 1) % sides, 2 * sides + 0 * i, 2 * sides + 1 + 0 * i

@@ -1,0 +1,36 @@
+"""Our pictures against path-traced ones of the same strands, camera, lights and fibres."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.validation.pictures import compare, load, render
+
+PICTURES = Path(__file__).parents[2].parent / "shared/reference/pictures"
+
+
+@pytest.mark.parametrize(
+    ("name", "colour"),
+    [("s1_brown", (0.07, 0.07, 0.07)), ("s1_black", (0.07, 0.10, 0.10)), ("s3_brown", (0.07, 0.07, 0.15))],
+)
+def test_hair_looks_like_path_traced_hair(name: str, colour: tuple[float, float, float]) -> None:
+    """Colour, place of light and shadow, and detail: between the denoised picture's, too soft, and the noisy one's."""
+    if not (PICTURES / "scenes.json").is_file():
+        pytest.skip("the shared path-traced pictures are not on this machine")
+    pytest.importorskip("OpenEXR")
+    reference = load(PICTURES, name)
+    picture, covered = render(reference)
+    hair = covered > 0.95
+    noisy, smooth = (compare(picture, each[..., :3], hair) for each in (reference.noisy, reference.smooth))
+    print(
+        f"{name}: ratio {np.round(noisy.ratio, 3)}, correlation {noisy.correlation:.4f}, contrast "
+        f"{smooth.contrast[1]:.2f} < {noisy.contrast[0]:.2f} < {noisy.contrast[1]:.2f}, 99th percentile "
+        f"{noisy.highlights[0]:.2f} for {smooth.highlights[1]:.2f} and {noisy.highlights[1]:.2f}"
+    )
+    assert (np.abs(np.array(noisy.ratio) - 1) < colour).all()
+    assert noisy.correlation > 0.97
+    assert 0.85 * min(smooth.highlights[1], noisy.highlights[1]) < noisy.highlights[0]
+    assert noisy.highlights[0] < 1.15 * max(smooth.highlights[1], noisy.highlights[1])
+    if name != "s3_brown":  # its fibres cover pixels evenly: what varies there is noise of the path tracer
+        assert 0.85 * smooth.contrast[1] < noisy.contrast[0] < 1.15 * noisy.contrast[1]
