@@ -295,12 +295,16 @@ class FrameRenderer:
 
 
 def _bounds(moment: Moment) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower and upper corner (3,) [m] of all strands: whole margins, so that the grid of shadows stands still while
-    hair moves a little, and nothing shimmers.
+    """Lower and upper corner (3,) [m] of all strands, whole margins from the middle of the roots: the grid of shadows goes
+    with the head and stands still while hair moves a little, so that nothing shimmers.
     """
-    lower = _MARGIN * np.floor(moment.guides.min(axis=(0, 1)).astype(np.float64) / _MARGIN - 1)
-    upper = _MARGIN * np.ceil(moment.guides.max(axis=(0, 1)).astype(np.float64) / _MARGIN + 1)
-    return lower, upper
+    middle = moment.guides[:, 0].mean(axis=0, dtype=np.float64)
+    lower = moment.guides.min(axis=(0, 1)) - middle
+    upper = moment.guides.max(axis=(0, 1)) - middle
+    return (
+        middle + _MARGIN * np.floor(lower / _MARGIN - 1),
+        middle + _MARGIN * np.ceil(upper / _MARGIN + 1),
+    )
 
 
 def _box_corners(box: NDArray[np.float64]) -> NDArray[np.float64]:
