@@ -96,7 +96,7 @@ sweep: $(if $(NAME),outputs/$(NAME)/sweep) ## all experiments of CONFIG's [sweep
 
 # --- Checks --------------------------------------------------------------------------------------
 
-.PHONY: test lint validate interpolation gallery docs site images approve bench sanitize schema coverage wheel
+.PHONY: test lint validate interpolation gallery docs site images approve bench sanitize schema fuzz coverage wheel
 test: env ## all tests
 	$(BIN)/pytest -n 2 --dist loadfile
 
@@ -135,6 +135,10 @@ bench: env ## the figures of the README
 
 schema: env ## configs/schema.json, after a change of pipeline/config/schema/
 	$(RINGLET) config --schema >configs/schema.json
+
+fuzz: env ## 100,000 damaged files for every reader and 2,000 calls of every kernel: hours; make fuzz FILES=1000
+	$(BIN)/python -m tests.hostile.boundary
+	$(BIN)/python -m tests.hostile.fuzz --files $(or $(FILES),100000) --keep outputs/fuzz
 
 coverage: env ## the tests once more, and which lines of Python they never ran; fails below 90 %
 	rm -f .coverage .coverage.*

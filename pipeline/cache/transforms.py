@@ -97,7 +97,7 @@ def _read_hdf5(path: Path, fps: float) -> tuple[Floats, Floats, Where]:
         with h5py.File(path, "r", locking=False) as file:
             matrices = np.asarray(file["transforms"], np.float64)
             times = np.asarray(file["time"], np.float64) if "time" in file else np.arange(len(matrices)) / fps
-    except (OSError, KeyError, ValueError, TypeError) as error:
+    except (OSError, LookupError, RuntimeError, ValueError, TypeError, MemoryError) as error:
         raise InputError(f'{path}: no dataset "transforms" of numbers can be read ({error})') from None
     if matrices.ndim != 3 or matrices.shape[1:] != (4, 4) or times.shape != matrices.shape[:1]:
         raise InputError(

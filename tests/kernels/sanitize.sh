@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs the kernel tests under AddressSanitizer and UndefinedBehaviorSanitizer.
+# Runs the kernel tests, and calls of every kernel with arrays that do not fit, under AddressSanitizer and UndefinedBehaviorSanitizer.
 #
 #   PYTHON=.venv/bin/python tests/kernels/sanitize.sh [pytest arguments]
 #
@@ -36,5 +36,6 @@ import pytest
 # The copy, not an editable install of the working tree
 sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
 sys.path.insert(0, sys.argv[1])
-sys.exit(pytest.main(sys.argv[2:]))
-' "$build/tree" "$root/tests/kernels" --rootdir "$root" -c "$root/pyproject.toml" -p no:cacheprovider "$@"
+sys.path.append(sys.argv[2])  # tests that tests import
+sys.exit(pytest.main(sys.argv[3:]))
+' "$build/tree" "$root" "$root/tests/kernels" "$root/tests/hostile/test_boundary.py" --rootdir "$root" -c "$root/pyproject.toml" -p no:cacheprovider "$@"
