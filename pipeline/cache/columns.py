@@ -4,6 +4,7 @@ HDF5's own filter calls zlib, which is the slowest part of writing; ISA-L deflat
 the same ratio, so chunks are filtered here and handed over finished. Any HDF5 reader understands them.
 """
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from pipeline.errors import InputError
 
 CHUNK_BYTES = 1 << 20
+_DENSEST = 1100  # bytes that one deflated byte can stand for, and some more
 _NotDeflated: type[Exception] = isal_zlib.error  # type: ignore[assignment]
 
 
@@ -98,19 +100,42 @@ class Column:
         self._path, self._dataset, self._checksums = path, dataset, checksums
         self.shape: tuple[int, ...] = dataset.shape
         self.dtype: np.dtype[Any] = dataset.dtype
+        chunks = dataset.chunks or (1,)
+        # Before room is made for what a file says that it holds
+        if not (
+            self.dtype.kind in "iufb"
+            and (len(self) == 0 or chunks[1:] == self.shape[1:])
+            and -(-len(self) // chunks[0]) == len(checksums)
+            and math.prod(chunks) * self.dtype.itemsize <= _DENSEST * max(1 << 16, path.stat().st_size)
+        ):
+            raise Damaged(path, f"the chunks of dataset {dataset.name} do not fit its checksums")
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __getitem__(self, item: Any) -> NDArray[Any]:
-        """Read rows; anything but a plain slice or a row number reads the whole column first."""
+        """Read rows; of a list of row numbers the chunks that they lie in. Any other index reads the whole column first."""
         if isinstance(item, int | np.integer):
             row = range(len(self))[item]
             return np.asarray(self._read(row, row + 1)[0])
         if isinstance(item, slice) and item.step in (None, 1):
             start, stop, _ = item.indices(len(self))
             return self._read(start, max(start, stop))
+        if isinstance(item, np.ndarray) and item.ndim == 1 and item.dtype.kind in "iu":
+            return self._rows(item)
         return np.asarray(self._read(0, len(self))[item])
+
+    def _rows(self, rows: NDArray[np.integer]) -> NDArray[Any]:
+        """Rows by their numbers, chunk by chunk. Raises IndexError for one that there is not."""
+        if len(rows) and not (int(rows.min()) >= 0 and int(rows.max()) < len(self)):
+            raise IndexError(f"{self._path}: a row beyond the {len(self)} of dataset {self._dataset.name}")
+        found = np.empty((len(rows), *self.shape[1:]), self.dtype)
+        size = self._dataset.chunks[0] if len(rows) else 1
+        within = rows // size
+        for number in np.unique(within).tolist():
+            here = within == number
+            found[here] = self._chunk(int(number), size)[rows[here] - number * size]
+        return found
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return self[:].astype(dtype or self.dtype, copy=bool(copy))

@@ -96,10 +96,21 @@ class Reader:
         return name in self.names
 
     def __getitem__(self, name: str) -> Column:
-        """A column; raises KeyError when the file has none of this name."""
+        """A column; raises KeyError when the file has none of this name, Damaged when it cannot be read."""
         if name not in self.names:
             raise KeyError(f"{self.path}: no column {name}; it has {', '.join(self.names)}")
-        return Column(self.path, self._file[name], self._file[f"checksums/{name}"][:])
+        try:
+            return Column(self.path, self._file[name], self._file[f"checksums/{name}"][:])
+        except (
+            OSError,
+            RuntimeError,
+            LookupError,
+            ValueError,
+            TypeError,
+            AttributeError,
+            MemoryError,
+        ) as error:
+            raise Damaged(self.path, f"column {name} is none") from error
 
     def verify(self) -> None:
         """Read everything; raises Damaged."""

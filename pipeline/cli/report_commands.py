@@ -68,8 +68,12 @@ def diff(
 def write_report(loaded: "Loaded", experiment: "Experiment") -> Path:
     """Write the report of a run into its folder; returns its path."""
     from pipeline.cache import replacing
+    from pipeline.cache.atomic import remove_stale
     from pipeline.report import run_page
 
+    remove_stale(
+        experiment.folder
+    )  # of a process that was killed here; a run with nothing to do removes nothing else
     with replacing(experiment.report) as temporary:
         temporary.write_text(run_page(loaded, experiment), "utf-8")
     return experiment.report

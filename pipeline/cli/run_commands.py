@@ -167,6 +167,7 @@ def _make(
     log.use(manner.log_format)
     refuse_bare_start()  # before anything large is loaded
     from pipeline.batch.stages import NEEDS, Batch
+    from pipeline.cache import where_writable
     from pipeline.config import STAGES
 
     if stage not in STAGES:
@@ -186,7 +187,8 @@ def _make(
             batch.make(name, touch=everything)
         batch.make(stage, wanted if stage == "render" else None)
         if stage == "render" and wanted is None:
-            write_report(loaded, batch.experiment)
+            with where_writable():
+                write_report(loaded, batch.experiment)
 
 
 def refuse_what_does_not_fit(

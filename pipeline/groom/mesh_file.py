@@ -22,8 +22,8 @@ from pipeline.errors import InputError
 Faces = NDArray[np.int64]
 
 # What a reader may take, and more for each byte of the file: damaged files ask for anything, or never end.
-_MEMORY, _MEMORY_A_BYTE = 4 << 30, 200  # [bytes]
-_SECONDS, _SECONDS_A_BYTE = 10, 2e-6  # [s] of processor time
+_MEMORY, _MEMORY_A_BYTE = 2 << 30, 200  # [bytes]
+_SECONDS, _SECONDS_A_BYTE = 4, 2e-6  # [s] of processor time
 _FILES_AT_A_TIME = 64
 
 

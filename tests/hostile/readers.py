@@ -2,12 +2,12 @@
 
 import io
 import struct
-from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 import numpy as np
 from isal import isal_zlib
+from numpy.typing import NDArray
 from PIL import Image
 
 from pipeline import cache
@@ -100,11 +100,11 @@ def _formula(path: Path) -> object:
         raise InputError(f"{path}: {error}") from None
 
 
-def _text(rows: "np.typing.NDArray[np.integer]") -> bytes:
+def _text(rows: NDArray[np.integer]) -> bytes:
     return "".join(",".join(map(str, row)) + "\n" for row in rows.tolist()).encode()
 
 
-def _npy(array: "np.typing.NDArray[np.integer]") -> bytes:
+def _npy(array: NDArray[np.integer]) -> bytes:
     to = io.BytesIO()
     np.save(to, array)
     return to.getvalue()
@@ -149,7 +149,7 @@ def _mesh(path: Path) -> object:
         return read_mesh(path, painted=True)
     except MemoryError:
         raise
-    except (Exception, SystemExit) as error:
+    except (Exception, SystemExit) as error:  # noqa: BLE001, whatever libraries raise
         raise InputError(f"{path}: {error}") from None
 
 
@@ -202,6 +202,3 @@ def _cache(path: Path) -> object:
     with cache.open(path, "groom") as reader:
         reader.verify()
         return [reader[name][:] for name in reader.names]
-
-
-READERS: dict[str, Callable[[Path], list[Target]]] = {"all": targets}

@@ -1,0 +1,77 @@
+"""Damaged files, as many as seconds allow; `python -m tests.hostile.fuzz` reads 100,000 for every reader."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import InputError
+from tests.hostile import engine
+
+ROOT = Path(__file__).parents[2]
+QUICK = (
+    ".hair",
+    ".tfx",
+    ".data",
+    ".usda",
+    "config",
+    "formula",
+    "transforms",
+    "pins",
+    "parting",
+    "paint",
+    "picture",
+    "cache",
+)
+
+
+@pytest.mark.parametrize("reader", [*QUICK, ".vtp", "mesh.obj"])
+def test_damaged_files_are_read_or_refused_in_bounded_time_and_memory(tmp_path: Path, reader: str) -> None:
+    count = "120" if reader in QUICK else "30"
+    command = [sys.executable, "-m", "tests.hostile.fuzz", "--files", count, "--keep", str(tmp_path / "kept")]
+    done = subprocess.run([*command, "--only", reader], cwd=ROOT, capture_output=True, text=True, check=False)
+    print(done.stdout, done.stderr)
+    assert done.returncode == 0
+    outcomes = json.loads(done.stdout)
+    assert outcomes
+    for name, found in outcomes.items():
+        assert sum(found.values()) == int(count), name
+        assert found[engine.REFUSED] > 0.3 * int(count), name
+
+
+HARM: dict[str, Callable[[], object]] = {  # what a reader may do, and how the fuzzer calls it
+    "MemoryError": lambda: bytearray(1 << 30),
+    "IndexError": lambda: [][1],
+    "SIGABRT": os.abort,
+    "SIGALRM": lambda: time.sleep(60),
+    "nameless message: wrong": lambda: refuse("wrong"),
+    "what was read does not fit together": lambda: None,
+}
+
+
+def refuse(message: str) -> None:
+    raise InputError(message)
+
+
+@pytest.mark.parametrize("named", HARM)
+def test_the_fuzzer_notices_a_reader_that_breaks(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, named: str
+) -> None:
+    def broken(path: Path) -> object:
+        return 1 if path.stat().st_size == 400 else HARM[named]()
+
+    monkeypatch.setattr(engine, "SECONDS", 0.2)
+    monkeypatch.setattr(engine, "PATIENCE", 3)
+    target = engine.Target(
+        "broken", ".x", [bytes(range(200)) * 2], broken, fits=lambda found: found is not None
+    )
+    outcomes = engine.fuzz(target, range(12), 3, tmp_path)
+    print(outcomes)
+    assert outcomes[named] >= 1
+    assert outcomes.get(engine.READ, 0) >= 1
+    assert sum(outcomes.values()) == 12
