@@ -9,7 +9,7 @@ from typing import Any
 from pipeline import cache
 
 LOG = Path(os.environ["RINGLET_TEST_LOG"])
-SECONDS = 0.15
+SECONDS = 0.1
 
 
 def note(what: str, path: Path) -> None:

@@ -23,7 +23,7 @@ pytest.importorskip("distributed", reason='needs the extra "farm"')
 from pipeline.farm.run import LARGEST_CHUNK, chunks, make
 
 ROOT = Path(__file__).parents[2]
-FRAMES = 24
+FRAMES = 15
 CONFIG = f"""\
 name = "farmed"
 [groom]
@@ -171,7 +171,7 @@ def test_a_worker_killed_in_the_middle_of_a_frame_costs_one_frame(
     killed: list[str] = []
 
     def kill() -> None:
-        wait_for(lambda: len(begun.lines("begin")) > 5)
+        wait_for(lambda: len(begun.lines("begin")) > 3)
         name, process = begun.lines("begin")[-1]
         os.kill(process, signal.SIGKILL)
         killed.append(name)
@@ -211,7 +211,7 @@ def test_a_scheduler_that_is_restarted_goes_on_with_what_is_missing(
     begun: Farm, serial: cache.Experiment, tmp_path: Path
 ) -> None:
     def restart() -> None:
-        wait_for(lambda: len(begun.lines("end")) > 5)
+        wait_for(lambda: len(begun.lines("end")) > 3)
         os.killpg(begun.scheduler.pid, signal.SIGKILL)
         begun.scheduler.wait()
         begun.scheduler = begun.start_scheduler()
