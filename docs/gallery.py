@@ -8,7 +8,18 @@ import sys
 from panels import DOCS, rendered, side_by_side
 
 PICTURES = DOCS / "pictures" / "gallery"
-STYLES = ("default", "straight", "wavy", "side_parting", "zigzag", "bob", "crop", "curly", "coils", "ponytail")
+STYLES = (
+    "default",
+    "straight",
+    "wavy",
+    "side_parting",
+    "zigzag",
+    "bob",
+    "crop",
+    "curly",
+    "coils",
+    "ponytail",
+)
 FRAMES = (1, 18)  # as groomed, and in motion
 SIZE = (520, 600)  # [px] of a frame
 QUALITY = 88
