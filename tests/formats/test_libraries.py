@@ -298,7 +298,7 @@ HARM = {  # what a library may do instead of reading, and what the message must 
     "crashed (SIGABRT)": "import os; os.abort()",
     "takes more than": "x = bytearray(1 << 36)",
     "took more than 4 s": "import signal; signal.raise_signal(signal.SIGXCPU)",
-    "cannot be read (KeyError: 5)": "import resource as r; {}[r.getrlimit(r.RLIMIT_CPU)[0]]",
+    "cannot be read (KeyError: 4)": "import resource as r; {}[r.getrlimit(r.RLIMIT_CPU)[0]]",
     "cannot be read (KeyError: 2147483648)": "import resource as r; {}[r.getrlimit(r.RLIMIT_AS)[0]]",
     "cannot be read (KeyError: 'x')": "{}['x']",
 }
@@ -322,8 +322,8 @@ def test_limits_grow_with_the_file(tmp_path: Path) -> None:
     small.touch()
     with large.open("wb") as file:
         file.truncate(100_000_000)
-    assert Limits.of(small) == Limits(2 << 30, 5)
-    assert Limits.of(large) == Limits((2 << 30) + 6_400_000_000, 55)
+    assert Limits.of(small) == Limits(2 << 30, 4)
+    assert Limits.of(large) == Limits((2 << 30) + 6_400_000_000, 54)
     assert struct.calcsize("P") == 8, sys.platform  # such limits need addresses of 64 bits
     with pytest.raises(InputError, match="no such groom file"):
         Limits.of(tmp_path / "none.abc")

@@ -6,7 +6,7 @@
 
 import numpy as np
 import pytest
-from conftest import helix
+from named_strands import helix
 from strand_scenes import drive, hairy_sphere, settings, shake, shape, sphere
 
 from pipeline import kernels

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import helix
+from named_strands import helix
 from strand_scenes import Points, drive, hairy_sphere, settings, shape, turned
 
 from pipeline import kernels

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import helix
+from named_strands import helix
 from numpy.typing import NDArray
 from strand_scenes import (
     STILL,

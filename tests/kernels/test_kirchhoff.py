@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import rod_twin
-from conftest import helix
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from named_strands import helix
 from rod_twin import Frame
 from strand_scenes import BENDING, TWISTING, Points, rotation, shape
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import helix
+from named_strands import helix
 from numpy.typing import NDArray
 from strand_scenes import shape
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import Make
+from small_runs import Make
 
 from pipeline.cli.main import call
 

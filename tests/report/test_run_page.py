@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from conftest import Make, add_to_log
+from small_runs import Make, add_to_log
 
 Visit = Callable[[Path], Any]
 HOSTILE = "<img src=x onerror=alert(1)>"
