@@ -6,6 +6,7 @@
 #include "pose.hpp"
 #include "skin.hpp"
 
+#include <cmath>
 #include <optional>
 
 namespace ringlet {
@@ -52,7 +53,7 @@ RINGLET_INLINE Ints in_box(const DistanceField &field, const Vec3<float> &x) {
 __attribute__((noinline)) inline Floats past_head(const Occluder &head, const SkinPoints &p, const Vec3<float> &L) {
     Floats open = splat(1.0f);
     if (!head.field) return open;
-    constexpr float sharpness = 7;
+    constexpr float sharpness = 4; // of lights that are 14 degrees wide: edges no finer than the mesh
     const float step = float(head.field->spacing);
     const Vec3<float> start = head.to_rest(p.x + splat(0.5f * step) * p.normal), toward = head.to_rest.turn(L);
     Floats way = splat(1.5f * step);
@@ -86,6 +87,24 @@ RINGLET_INLINE Vec3<float> clear_of(const Vec3<float> &normal, const Vec3<float>
     return (1.0f / square_root<float>(dot(up, up) + 1e-12f)) * up;
 }
 
+/// Part of the light of map l, in R, G, B, that hair lets past around points `above` the skin, from the middle of the map:
+/// the mean over a disc as wide as light spreads in skin (Jensen et al., A Practical Model for Subsurface Light
+/// Transport, 2001). Shadows of single strands, finer than the mesh they fall on, would be stains at its points.
+inline void past_hair(const Illumination &light, int l, const Vec3<float> &above, const Vec3<float> &normal,
+                      const float loss[3], Floats past[3]) {
+    constexpr int places = 8;
+    constexpr float radius = 4e-3f; // [m]
+    const Floats flat = 1.0f - normal.y * normal.y, down = 1.0f / square_root<float>(flat + 1e-6f);
+    const Vec3<float> along{down * normal.z, splat(0.0f), -(down * normal.x)}, across = cross(normal, along);
+    for (int c = 0; c < 3; ++c) past[c] = splat(0.0f);
+    for (int k = 0; k < places; ++k) {
+        const float out = radius * std::sqrt((k + 0.5f) / places), turn = 2.39996323f * k; // the golden angle
+        const Vec3<float> at = above + splat(out * std::cos(turn)) * along + splat(out * std::sin(turn)) * across;
+        const Floats n = reach(light.shadows->maps[l], at, 0.0f).n;
+        for (int c = 0; c < 3; ++c) past[c] += (1.0f / places) * exponential(-loss[c] * n);
+    }
+}
+
 RINGLET_INLINE Floats gloss(const SkinPoints &p, const Vec3<float> &L, Floats facing) {
     const Vec3<float> middle = p.to_eye + L;
     const Floats square = dot(middle, middle);
@@ -109,12 +128,13 @@ inline void light_skin(const SkinPoints &p, const Illumination &light, const Occ
         const Vec3<float> L = light.direction(l);
         const Floats cosine = dot(p.normal, L);
         if (!any<float>(cosine + kSkinReach * p.curvature > 0.0f)) continue;
-        const Floats open = past_head(head, p, clear_of(p.normal, L, cosine)), n = reach(light.shadows->maps[l], above, 0.0f).n;
+        const Floats open = past_head(head, p, clear_of(p.normal, L, cosine));
         const Floats shine = gloss(p, L, maximum<float>(cosine, splat(0.0f)));
-        Floats diffuse[3];
+        Floats diffuse[3], past[3];
         scattered(cosine, p.curvature, diffuse);
+        past_hair(light, l, above, p.normal, loss, past);
         for (int c = 0; c < 3; ++c)
-            radiance[c] += light.irradiance[3 * l + c] * open * exponential(-loss[c] * n) *
+            radiance[c] += light.irradiance[3 * l + c] * open * past[c] *
                            (albedo[c] * diffuse[c] * (1 / 3.14159265f) + shine);
     }
 }

@@ -15,6 +15,7 @@ from pipeline.config.schema import Config
 from pipeline.render.camera import CameraPath
 from pipeline.render.chunks import Chunks
 from pipeline.render.coverage import Chunk, Coverage
+from pipeline.render.finer import Finer
 from pipeline.render.geometry import (
     Shape,
     choose_shapes,
@@ -113,6 +114,7 @@ class FrameRenderer:
         self.background = DECODED[encode(background)]
         self._coverage = Coverage(self.target, render.size)
         self._widths = np.zeros((0, 0), np.float32)
+        self._finer: Finer | None = None  # of the head, whose triangles stay
 
     @property
     def lighting(self) -> Lighting:
@@ -271,11 +273,15 @@ class FrameRenderer:
         if skin is None:
             self.target.background()
             return
-        rotation = pose[:3, :3]
-        points = np.ascontiguousarray(skin.points @ rotation.T + pose[:3, 3], np.float32)
-        normals = np.ascontiguousarray(skin.normals @ rotation.T, np.float32)
-        colours = self.lighting.shade_surface(points, normals, skin.albedo, eye, skin.curvature)
-        self.target.triangles(points, skin.triangles, colours)
+        if self._finer is None:
+            self._finer = Finer(skin.triangles, len(skin.points))
+        finer, rotation = self._finer, pose[:3, :3].astype(np.float32)
+        points = np.ascontiguousarray(finer(skin.points) @ rotation.T + pose[:3, 3].astype(np.float32))
+        normals = finer(skin.normals) @ rotation.T
+        normals = np.ascontiguousarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+        curvature = None if skin.curvature is None else finer(skin.curvature)
+        colours = self.lighting.shade_surface(points, normals, finer(skin.albedo), eye, curvature)
+        self.target.triangles(points, finer.triangles, colours)
 
     def _corners(
         self, moment: Moment, lower: NDArray[np.float64], upper: NDArray[np.float64]
