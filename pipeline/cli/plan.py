@@ -14,7 +14,7 @@ _GB = 1e9
 _FITTED_THREADS = 2
 _START_S = 0.8  # interpreter, libraries
 _START_GB = 0.1
-_VTK_GB = 0.46
+_VTK_GB = 0.37
 _GROOM_GB = 0.23  # head and scalp
 _GROOM_CHUNK_GB = 0.1  # strands in flight while they grow
 _GROOM_CHUNK = 50_000
@@ -38,6 +38,11 @@ _RENDER_S_PER_SAMPLE = 0.05e-6
 _RENDER_B_PER_POINT = 30  # of the strands in flight
 _RENDER_B_PER_SAMPLE = 60
 _RENDER_B_PER_SEGMENT = 14  # of strands that may be seen, sorted into tiles
+_LIGHT_B_PER_NODE = (
+    430  # of a light's shadow map, which has three nodes a voxel; of two moments, and while it is made
+)
+_LIGHT_B_PER_VOXEL = 59  # of density and sky
+_NODES = 9  # of a map over the square of the voxels along the longest side
 _BOUND_B = 70  # of a strand's binding in memory, and its order
 _IN_FLIGHT = 65_536  # strands: the renderer's chunk
 _KEPT_B = 200 << 20  # points that the renderer keeps between its two passes
@@ -121,11 +126,22 @@ def _render(config: Config) -> Cost:
         config
     )
     memory = kept + shapes + _RENDER_B_PER_POINT * in_flight + _RENDER_B_PER_SAMPLE * samples
-    memory += _RENDER_B_PER_SEGMENT * points
+    memory += _RENDER_B_PER_SEGMENT * points + _light(config)
     return Cost(
         _START_GB + _VTK_GB + memory / _GB,
         frames * pixels * _PNG_B_PER_PIXEL / _GB,
         _START_S + frames * frame,
+    )
+
+
+def _light(config: Config) -> float:
+    """Bytes of shadow maps and grids."""
+    from pipeline.render.lights import as_directions
+
+    directions, _ = as_directions(config.scene.lights)
+    return (
+        _NODES * _LIGHT_B_PER_NODE * len(directions) * config.render.grid**2
+        + _LIGHT_B_PER_VOXEL * config.render.grid**3
     )
 
 
