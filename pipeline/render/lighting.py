@@ -25,7 +25,7 @@ _MARGIN: Final = 3
 """Empty voxels around the hair, so that blur and slanted rays lose nothing."""
 _FINER: Final = 3
 """Nodes of the shadow maps along a voxel."""
-_CASTERS: Final = 400_000
+_CASTERS: Final = 200_000
 """Points of strands from which on not all cast shadows: of c times as many one in c^0.7."""
 _CASTER: Final = 41  # salt
 _NO_LIGHT: Final = np.zeros((0, 3), np.float32)
