@@ -53,7 +53,7 @@ RINGLET_INLINE Ints in_box(const DistanceField &field, const Vec3<float> &x) {
 __attribute__((noinline)) inline Floats past_head(const Occluder &head, const SkinPoints &p, const Vec3<float> &L) {
     Floats open = splat(1.0f);
     if (!head.field) return open;
-    constexpr float sharpness = 4; // of lights that are 14 degrees wide: edges no finer than the mesh
+    constexpr float sharpness = 7;
     const float step = float(head.field->spacing);
     const Vec3<float> start = head.to_rest(p.x + splat(0.5f * step) * p.normal), toward = head.to_rest.turn(L);
     Floats way = splat(1.5f * step);
