@@ -17,7 +17,7 @@
 
 namespace ringlet {
 
-inline constexpr double kMostTurn = 1.2;       // [rad] that a step turns a director by, at most
+inline constexpr double kMostTurn = 1.06; // [rad] that a step turns a director by, at most: a root at 10 turns/s and 1/60 s
 inline constexpr double kMostCorrection = 0.8; // [rad] that the Newton step turns it by, at most
 inline constexpr double kNoStiffness = 1e-25;  // [N m] far below any hair's, for strands without
 
