@@ -76,11 +76,7 @@ def bench(
     """
     if threads:
         kernels.set_threads(threads)
-    render = Render.model_validate({"size": size, "geometry": geometry, "samples": samples})
-    camera = Camera(position=(0.25, -0.02, 0.75), look_at=(0.0, -0.05, 0.0), field_of_view=0.5)
-    config = Config(
-        name="bench", scene=Scene(head="none", camera=camera), groom=Groom(source="swatch"), render=render
-    )
+    config = _config(Render.model_validate({"size": size, "geometry": geometry, "samples": samples}))
     groom, rest = round_groom(min(_GROOM, strands), points, min(_GUIDES, strands))
     binding = whole(groom, Interpolate(strands=strands), seed=1)
     guides = rest[groom.guides.strand]
@@ -93,7 +89,7 @@ def bench(
         made = Frames(
             config,
             renderer,
-            CameraPath.of(camera, Placement()),
+            CameraPath.of(config.scene.camera, Placement()),
             _Swinging(guides),
             Pictures(Path(folder), config, "bench"),
         )
@@ -112,6 +108,12 @@ def bench(
         "parts": {part: round(value / frames, 3) for part, value in spent.items()},
         "picture": digest.hexdigest()[:12],
     }
+
+
+def _config(render: Render) -> Config:
+    camera = Camera(position=(0.25, -0.02, 0.75), look_at=(0.0, -0.05, 0.0), field_of_view=0.5)
+    scene = Scene(head="none", camera=camera)
+    return Config(name="bench", scene=scene, groom=Groom(source="swatch"), render=render)
 
 
 def _peak_gb() -> float:
