@@ -980,6 +980,13 @@ def shaken(points: _F64, length: _F64, sines: _F64, rise: _F64) -> _F64:
     They grow from the root on, over the arc length `rise` (S,) [m].
     """
 
+def turned(points: _F64, length: _F64, turn: _F64) -> _F64:
+    """Points (S, P, 3) [m] of strands whose segments turn about an axis; none changes its length.
+
+    `turn` (S, 6) is the unit axis x, y, z, begin [m], over [m] and angle [rad]: the segment whose middle is at arc length
+    s turns by angle * smoothstep((s - begin) / over).
+    """
+
 def drawn_in(
     points: _F64, length: _F64, middles: _F64, middle_length: _F64, lock: NDArray[np.int64], pull: _F64
 ) -> _F64:

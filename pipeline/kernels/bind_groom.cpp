@@ -111,6 +111,18 @@ static Numbers shaken(Strands points, PerStrand length, Array<const double, -1, 
     });
 }
 
+static Numbers turned(Strands points, PerStrand length, Array<const double, -1, 6> turn) {
+    const size_t S = points.shape(0), P = points.shape(1);
+    require(P >= 2, "turned: expected strands of at least 2 points");
+    require(length.shape(0) == S && turn.shape(0) == S, "turned: expected a row for each strand");
+    return for_blocks(points, [&](const BlockIndex<double> &index, const Vec3<double> *x, Vec3<double> *moved) {
+        Lanes<double> whole, row[6];
+        gather<double>(&whole, length.data(), 1, 1, index.strand);
+        gather<double>(row, turn.data(), 6, 6, index.strand);
+        turn_segments(x, int(P), whole, {{row[0], row[1], row[2]}, row[3], row[4], row[5]}, moved);
+    });
+}
+
 static Numbers drawn_in(Strands points, PerStrand length, Strands middles, PerStrand middle_length,
                         Array<const int64_t, -1> lock, Array<const double, -1, 4> pull) {
     const size_t S = points.shape(0), P = points.shape(1), M = middles.shape(0);
@@ -253,6 +265,7 @@ void bind_groom(nb::module_ &m) {
     m.def("resampled", &resampled, nb::arg("points"), nb::arg("count"));
     m.def("coiled", &coiled, nb::arg("points"), nb::arg("reference"), nb::arg("length"), nb::arg("coil"));
     m.def("shaken", &shaken, nb::arg("points"), nb::arg("length"), nb::arg("sines"), nb::arg("rise"));
+    m.def("turned", &turned, nb::arg("points"), nb::arg("length"), nb::arg("turn"));
     m.def("drawn_in", &drawn_in, nb::arg("points"), nb::arg("length"), nb::arg("middles"), nb::arg("middle_length"),
           nb::arg("lock"), nb::arg("pull"));
     m.def("shortened", &shortened, nb::arg("points"), nb::arg("length"), nb::arg("count"));

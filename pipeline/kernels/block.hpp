@@ -125,8 +125,11 @@ void gather(Lanes<Real> *to, const Source *source, int count, int stride, const 
     constexpr int n = kLanes<Real>;
     for (int first = 0; first < count; first += n) {
         if (count < n) {
-            for (int lane = 0; lane < n; ++lane)
-                for (int i = 0; i < count; ++i) to[i][lane] = Real(source[size_t(strand[lane]) * stride + i]);
+            for (int i = 0; i < count; ++i) {
+                Lanes<Real> column{};
+                for (int lane = 0; lane < n; ++lane) column[lane] = Real(source[size_t(strand[lane]) * stride + i]);
+                to[i] = column;
+            }
             return;
         }
         const int begin = std::min(first, count - n); // the last piece overlaps the one before

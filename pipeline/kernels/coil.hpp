@@ -1,4 +1,4 @@
-// Waves on strands: a helix about each, and sines across it; a lane per strand.
+// Shapes given to strands: a helix about each, sines across it, and a turn that stays; a lane per strand.
 //
 // A helix is an offset amplitude (cos U + minor sin V) in frames of least rotation (double reflection: Wang, Juettler,
 // Zheng and Liu, "Computation of Rotation Minimizing Frames", 2008). Notation: x points, t unit tangent, U, V unit
@@ -64,6 +64,25 @@ inline void shake(Vec3<double> *x, int P, Lanes<double> length, const Sine *sine
         Vec3<double> sum{};
         for (int k = 0; k < K; ++k) sum = sum + of_turns(s / sines[k].period + sines[k].phase).sine * sines[k].amplitude;
         x[j] = x[j] + smoothstep<double>(s / rise) * sum;
+    }
+}
+
+struct Turn {
+    Vec3<double> axis;                // unit vector
+    Lanes<double> begin, over, angle; // [m] of arc length, [m], [rad]
+};
+
+/// Segments turned about an axis, by angles that grow from 0 at `begin` to `angle` over the length `over`, by Rodrigues'
+/// formula; none changes its length.
+inline void turn_segments(const Vec3<double> *x, int P, Lanes<double> length, const Turn &turn, Vec3<double> *out) {
+    constexpr double kTurn = 6.283185307179586;
+    const Lanes<double> step = length / double(P - 1);
+    out[0] = x[0];
+    for (int j = 0; j + 1 < P; ++j) {
+        const Lanes<double> part = smoothstep<double>((step * (j + 0.5) - turn.begin) / turn.over);
+        const SineCosine by = of_turns(part * turn.angle / kTurn);
+        const Vec3<double> v = x[j + 1] - x[j];
+        out[j + 1] = out[j] + by.cosine * v + by.sine * cross(turn.axis, v) + ((1 - by.cosine) * dot(turn.axis, v)) * turn.axis;
     }
 }
 

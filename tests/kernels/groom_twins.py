@@ -40,6 +40,21 @@ def shaken(points: Vectors, length: Vectors, sines: Vectors, rise: Vectors) -> V
     )
 
 
+def turned(points: Vectors, length: Vectors, turn: Vectors) -> Vectors:
+    """Segments turned about an axis each, by Rodrigues' formula."""
+    axis, (begin, over, angle) = turn[:, None, :3], turn[:, 3:].T[..., None]
+    segments = np.diff(points, axis=1)
+    middle = (np.arange(segments.shape[1]) + 0.5) / segments.shape[1] * length[:, None]
+    by = (smoothstep((middle - begin) / over) * angle)[..., None]
+    c, s = np.cos(by), np.sin(by)
+    moved = (
+        c * segments
+        + s * np.cross(axis, segments)
+        + (1 - c) * (axis * segments).sum(axis=2, keepdims=True) * axis
+    )
+    return np.concatenate([points[:, :1], points[:, :1] + np.cumsum(moved, axis=1)], axis=1)
+
+
 def drawn_in(
     points: Vectors,
     length: Vectors,

@@ -105,6 +105,14 @@ def test_sines_are_those_of_their_twin(rng: np.random.Generator, strands: Vector
     assert off("shaken", kernels.shaken(*given), groom_twins.shaken(*given)) < 1e-13
 
 
+def test_turns_are_those_of_their_twin(rng: np.random.Generator, strands: Vectors, length: Vectors) -> None:
+    axis = rng.normal(size=(S, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    turn = np.concatenate([axis, rng.uniform([0, 0.01, -3], [0.1, 0.1, 3], (S, 3))], axis=1)
+    given = strands, length, turn
+    assert off("turned", kernels.turned(*given), groom_twins.turned(*given)) < 1e-13
+
+
 def test_locks_are_those_of_their_twin(rng: np.random.Generator, strands: Vectors, length: Vectors) -> None:
     """Middles of other counts of points, some of them too short."""
     middles = groom_twins.shortened(strands, rng.uniform(0.05, 0.15, S), 19)[:5]

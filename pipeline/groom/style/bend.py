@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline import kernels
 from pipeline.config.schema import Bend
 from pipeline.groom.head.distance import smoothstep
 from pipeline.groom.style.chance import Chance
@@ -20,21 +21,21 @@ def bent(hair: Hair, op: Bend, ground: Ground, chance: Chance) -> Hair:
     begin = hair.free_from + op.start
     if op.measured_from == "tip":
         begin = hair.length - op.start - op.over
-    segments = np.diff(hair.points, axis=1)
-    row = np.arange(len(hair))
-    first = np.clip((begin / hair.length * segments.shape[1]).astype(np.int64), 0, segments.shape[1] - 1)
-    axis = np.cross(unit(segments[row, first]), _towards(hair.points[row, first], op, ground))
-    size = np.sqrt(dot(axis, axis))
+    axis, size = _axes(hair, begin, op, ground)
     angle = ground.values(op.angle, hair) * (1 + op.jitter * (2 * chance.uniform(hair.index, _ANGLE) - 1))
-    middle = 0.5 * (hair.along[:, 1:] + hair.along[:, :-1])
-    turned = (
-        smoothstep((middle - begin[:, None]) / op.over) * (angle * smoothstep(size[:, 0] / _ALONG))[:, None]
+    turn = np.stack([begin, np.full(len(hair), op.over), angle * smoothstep(size / _ALONG)], axis=1)
+    return replace(
+        hair, points=kernels.turned(hair.points, hair.length, np.concatenate([axis, turn], axis=1))
     )
-    points = hair.points.copy()
-    points[:, 1:] = hair.points[:, :1] + np.cumsum(
-        _rotated(segments, unit(axis)[:, None], turned[..., None]), axis=1
-    )
-    return replace(hair, points=points)
+
+
+def _axes(hair: Hair, begin: Vectors, op: Bend, ground: Ground) -> tuple[Vectors, Vectors]:
+    """Unit axes (N, 3) of turning, and the sine (N,) of the angle between strand and direction where it begins."""
+    row, last = np.arange(len(hair)), hair.points.shape[1] - 2
+    first = np.clip((begin / hair.length * (last + 1)).astype(np.int64), 0, last)
+    at = hair.points[row, first]
+    axis = np.cross(unit(hair.points[row, first + 1] - at), _towards(at, op, ground))
+    return unit(axis), np.sqrt(dot(axis, axis))[:, 0]
 
 
 def _towards(points: Vectors, op: Bend, ground: Ground) -> Vectors:
@@ -43,9 +44,3 @@ def _towards(points: Vectors, op: Bend, ground: Ground) -> Vectors:
         return unit(np.broadcast_to(np.array(op.towards, float), points.shape))
     level = ground.under(op.op).wall.sample(points)[1] * [1.0, 0.0, 1.0]
     return -unit(level)
-
-
-def _rotated(v: Vectors, axis: Vectors, angle: Vectors) -> Vectors:
-    """Vectors (N, J, 3) turned about unit axes (N, 1, 3) by angles (N, J, 1) [rad] (Rodrigues' formula)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(c * v + s * np.cross(axis, v) + (1 - c) * dot(axis, v) * axis)
