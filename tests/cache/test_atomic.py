@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from second_process import first_words, wants
 
 from pipeline import cache
 from pipeline.cache.atomic import remove_stale
@@ -136,23 +137,10 @@ def test_a_really_full_disk_is_told_too() -> None:
 
 
 def test_a_second_process_waits_for_the_first_and_says_so(tmp_path: Path) -> None:
-    code = (
-        "import sys; from pathlib import Path; from pipeline import cache\n"
-        "with cache.Experiment(Path(sys.argv[1])).working_on('groom'): print('in', flush=True)"
-    )
     with cache.Experiment(tmp_path).working_on("groom"):
-        process = subprocess.Popen(
-            [sys.executable, "-c", code, str(tmp_path)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        assert process.stderr is not None
-        said = process.stderr.readline()
-        assert process.poll() is None
-    out, _ = process.communicate(timeout=30)
-    assert out == "in\n"
-    assert f"waiting for process {os.getpid()}" in said
+        process = wants("cache.Experiment(folder).working_on('groom')", tmp_path)
+        assert f"waiting for process {os.getpid()}" in first_words(process)
+    assert process.communicate(timeout=30)[0] == "in\n"
 
 
 def _dead_process() -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from second_process import first_words, wants
 
 from pipeline import cache
 
@@ -68,40 +69,21 @@ def test_without_hard_links_the_file_is_copied(
 
 
 def test_two_experiments_do_not_make_the_same_at_once(tmp_path: Path) -> None:
-    code = (
-        "import sys; from pathlib import Path; from pipeline import cache\n"
-        "with cache.Sharing(cache.Experiment(Path(sys.argv[1]) / 'b')).making('groom', 'k'): print('in', flush=True)"
-    )
     with cache.Sharing(cache.Experiment(tmp_path / "a")).making("groom", "k"):
-        process = subprocess.Popen(
-            [sys.executable, "-c", code, str(tmp_path)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        assert process.stderr is not None
-        assert f"waiting for process {os.getpid()}" in process.stderr.readline()
-        assert process.poll() is None
+        process = wants("cache.Sharing(cache.Experiment(folder / 'b')).making('groom', 'k')", tmp_path)
+        assert f"waiting for process {os.getpid()}" in first_words(process)
     assert process.communicate(timeout=30)[0] == "in\n"
 
 
 def test_different_frames_are_made_at_once_and_the_same_ones_are_not(tmp_path: Path) -> None:
-    code = (
-        "import sys; from pathlib import Path; from pipeline import cache\n"
-        "frames = range(int(sys.argv[2]), int(sys.argv[3]))\n"
-        "with cache.Experiment(Path(sys.argv[1])).working_on('render', frames): print('in', flush=True)"
-    )
-
     def start(first: int, end: int) -> subprocess.Popen[str]:
-        command = [sys.executable, "-c", code, str(tmp_path), str(first), str(end)]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return wants(f"cache.Experiment(folder).working_on('render', range({first}, {end}))", tmp_path)
 
     experiment = cache.Experiment(tmp_path)
     with experiment.working_on("render", range(1, 9)):
         assert start(9, 17).communicate(timeout=30)[0] == "in\n"
         overlapping = start(8, 10)
-        assert overlapping.stderr is not None
-        assert "waiting for" in overlapping.stderr.readline()
+        assert "waiting for" in first_words(overlapping)
         probe = [sys.executable, "-c", "import sys; from pathlib import Path; from pipeline import cache\n"
                  "print(cache.Experiment(Path(sys.argv[1])).workers_on('render'))", str(tmp_path)]  # fmt: skip
         found = subprocess.run(probe, capture_output=True, text=True, check=True).stdout

@@ -9,31 +9,18 @@ import time
 from pathlib import Path
 from typing import Any
 
+import fake_ringlet
 import numpy as np
 import pytest
+from small_configs import ONE_LIGHT, SWATCH
 
 from pipeline import cache
-from pipeline.batch.stages import Batch
 from pipeline.cli.base import print_json
 from pipeline.cli.main import call
 from pipeline.validation import Law, Outcome, Reading
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(Path(__file__).parent))
-from fake_ringlet import execute  # noqa: E402
-
-CONFIG = """\
-[scene]
-head = "none"
-[groom]
-source = "swatch"
-[simulate]
-frames = 3
-theta = 0.6
-[[scene.lights]]
-direction = [0, 1, 0]
-irradiance = 4.0
-"""
+CONFIG = SWATCH + "[simulate]\nframes = 3\ntheta = 0.6\n" + ONE_LIGHT
 
 
 class Ringlet:
@@ -64,8 +51,7 @@ class Ringlet:
 
 @pytest.fixture
 def ringlet(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Ringlet:
-    monkeypatch.setattr(Batch, "execute", execute)
-    monkeypatch.setattr("pipeline.config.keys.code_version", lambda _stage: "fixed")
+    fake_ringlet.fake(monkeypatch)
     monkeypatch.setenv("RINGLET_TEST_LOG", str(tmp_path / "log"))
     return Ringlet(tmp_path, capsys)
 
@@ -227,7 +213,7 @@ def test_a_full_disk_ends_a_run_with_one_message_and_nothing_lost(tmp_path: Path
     config = tmp_path / "x.toml"
     config.write_text(CONFIG)
     outputs = ["--outputs", str(tmp_path)]
-    fake = [sys.executable, str(Path(__file__).parent / "fake_ringlet.py")]
+    fake = [sys.executable, fake_ringlet.__file__]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     subprocess.run([*fake, "groom", str(config), *outputs], check=True, env=environment, capture_output=True)
     limited = (

@@ -8,18 +8,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from small_configs import SWATCH
 
 from pipeline.cli import doctor, machine
 from pipeline.cli.main import call
 
 ROOT = Path(__file__).parents[2]
 MEMINFO = "MemTotal: 9000000 kB\nMemFree: 1 kB\nMemAvailable: 8000000 kB\n"
-SWATCH = """\
-[scene]
-head = "none"
-[groom]
-source = "swatch"
-[simulate]
+CONFIG = f"""\
+{SWATCH}[simulate]
 frames = 2
 settle = 0
 [render]
@@ -76,7 +73,7 @@ def test_the_first_version_of_control_groups_counts_too(tmp_path: Path) -> None:
 
 def run(folder: Path, *options: str, addresses: int) -> subprocess.CompletedProcess[str]:
     config = folder / "x.toml"
-    config.write_text(SWATCH)
+    config.write_text(CONFIG)
     command = [sys.executable, "-m", "pipeline", "run", str(config), "--outputs", str(folder), *options]
     limit = (addresses, resource.RLIM_INFINITY)
     return subprocess.run(
@@ -111,7 +108,7 @@ def test_what_is_fresh_needs_no_memory_and_force_begins_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "x.toml"
-    config.write_text(SWATCH)
+    config.write_text(CONFIG)
     arguments = ["run", str(config), "--until", "groom", "--outputs", str(tmp_path)]
     monkeypatch.setattr(machine, "memory", lambda _stage: machine.Room(1e6, "a test"))
     assert call(arguments) == 2
@@ -124,7 +121,7 @@ def test_plan_tells_what_is_free_and_what_does_not_fit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "x.toml"
-    config.write_text(SWATCH)
+    config.write_text(CONFIG)
     plan = ["plan", str(config), "--outputs", str(tmp_path / "not" / "there")]
     assert call([*plan, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

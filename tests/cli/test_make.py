@@ -7,24 +7,16 @@ import sys
 import time
 from pathlib import Path
 
+import fake_ringlet
 import pytest
+from small_configs import SWATCH
 
 ROOT = Path(__file__).parents[2]
-FAKE = Path(__file__).parent / "fake_ringlet.py"
 
 SOURCES = ("requirements.lock", "pyproject.toml", ".ci/environment", "pipeline/kernels/CMakeLists.txt")
 BUILT = (".venv/.complete", "build/kernels/.built", "pipeline/errors.py")
 
-BASE = """\
-[scene]
-head = "none"
-[groom]
-source = "swatch"
-[simulate]
-frames = 3
-[render]
-samples = 1
-"""
+BASE = SWATCH + "[simulate]\nframes = 3\n[render]\nsamples = 1\n"
 
 
 class Project:
@@ -53,7 +45,7 @@ class Project:
         log.write_text("")
         environment = os.environ | {"RINGLET_TEST_LOG": str(log), "PYTHONPATH": str(ROOT)}
         environment = {key: value for key, value in environment.items() if not key.startswith("MAKE")}
-        command = ["make", *arguments, f"RINGLET={sys.executable} {FAKE}"]
+        command = ["make", *arguments, f"RINGLET={sys.executable} {fake_ringlet.__file__}"]
         return subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True)
 
     def make(self, *arguments: str) -> list[str]:

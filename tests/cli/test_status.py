@@ -8,8 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import fake_ringlet
 import numpy as np
 import pytest
+from small_configs import SWATCH
 
 from pipeline import cache, log
 from pipeline.batch.stages import Batch
@@ -17,25 +19,14 @@ from pipeline.cli.main import call
 from pipeline.cli.status import examine, lines
 from pipeline.config import load
 
-sys.path.insert(0, str(Path(__file__).parent))
-from fake_ringlet import execute
-
-CONFIG = """\
-[scene]
-head = "none"
-[groom]
-source = "swatch"
-[simulate]
-frames = 9
-"""
+CONFIG = SWATCH + "[simulate]\nframes = 9\n"
 
 Status = Callable[..., dict[str, Any]]
 
 
 @pytest.fixture
 def status(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Status:
-    monkeypatch.setattr(Batch, "execute", execute)
-    monkeypatch.setattr("pipeline.config.keys.code_version", lambda _stage: "fixed")
+    fake_ringlet.fake(monkeypatch)
     config = tmp_path / "x.toml"
     config.write_text(CONFIG)
 

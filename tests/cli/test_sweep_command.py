@@ -2,25 +2,19 @@
 
 import csv
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
+import fake_ringlet
 import pytest
+from small_configs import SWATCH
 
 from pipeline.batch.stages import Batch
 from pipeline.cli.main import call
 from pipeline.errors import InputError
 
-sys.path.insert(0, str(Path(__file__).parent))
-from fake_ringlet import execute
-
-CONFIG = """\
-[scene]
-head = "none"
-[groom]
-source = "swatch"
-[simulate]
+CONFIG = f"""\
+{SWATCH}[simulate]
 frames = 2
 [sweep]
 "simulate.hair.young_modulus" = ["2 GPa", "4 GPa"]
@@ -48,8 +42,7 @@ class Sweep:
 
 @pytest.fixture
 def sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Sweep:
-    monkeypatch.setattr(Batch, "execute", execute)
-    monkeypatch.setattr("pipeline.config.keys.code_version", lambda _stage: "fixed")
+    fake_ringlet.fake(monkeypatch)
     monkeypatch.setenv("RINGLET_TEST_LOG", str(tmp_path / "log"))
     return Sweep(tmp_path, capsys)
 
@@ -120,9 +113,9 @@ def test_one_experiment_that_fails_does_not_stop_the_others(
     def fails(batch: Batch, stage: str, frames: tuple[int, ...]) -> None:
         if stage == "simulate" and batch.config.simulate.hair.young_modulus == 2e9:
             raise InputError("too soft")
-        execute(batch, stage, frames)
+        fake_ringlet.execute(batch, stage, frames)
 
-    monkeypatch.setattr(Batch, "execute", fails)
+    fake_ringlet.fake(monkeypatch, fails)
     ran, said = sweep(code=2)
     assert ran.count("render 1 2") == 2
     assert said.splitlines()[-2:] == [

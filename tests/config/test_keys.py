@@ -3,22 +3,12 @@
 from pathlib import Path
 
 import pytest
+from small_configs import ONE_LIGHT, SWATCH
 
 from pipeline.config import Config, explain, load, stage_inputs, stage_keys
 from pipeline.config.keys import STAGES
 
-BASE = """\
-name = "x"
-[groom]
-source = "swatch"
-[scene]
-head = "none"
-[[scene.lights]]
-direction = [0, 1, 0]
-irradiance = 4.0
-[render]
-samples = 2
-"""
+BASE = f'name = "x"\n{SWATCH}{ONE_LIGHT}[render]\nsamples = 2\n'
 SIMULATE = "[simulate]\ntheta = 0.6\n"
 
 

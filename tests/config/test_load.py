@@ -4,11 +4,10 @@ import re
 from pathlib import Path
 
 import pytest
+from small_configs import SWATCH
 
 from pipeline.config import Loaded, load
 from pipeline.errors import InputError
-
-SWATCH = '[scene]\nhead = "none"\n[groom]\nsource = "swatch"\n'
 
 
 def write(folder: Path, name: str, text: str) -> Path:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from small_configs import SWATCH
 
 from pipeline.config import load, stage_keys
 from pipeline.config.formula import FUNCTIONS, VARIABLES, parse
@@ -10,7 +11,6 @@ from pipeline.config.schema import Clump, Curl, Frizz, Lengths
 from pipeline.errors import InputError
 from tests.config.test_load import complaint, loaded, write
 
-SWATCH = '[scene]\nhead = "none"\n[groom]\nsource = "swatch"\n'
 STYLE = """\
 [groom.style.tufts]
 op = "clump"

@@ -4,12 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
+from small_configs import SWATCH
 
 from pipeline.config import stage_keys
 from pipeline.config.sweep import Swept, load_sweep
 from pipeline.errors import InputError
 
-BASE = 'name = "x"\n[scene]\nhead = "none"\n[groom]\nsource = "swatch"\n'
+BASE = 'name = "x"\n' + SWATCH
 
 
 def swept(folder: Path, table: str, *overrides: str, base: str = BASE) -> Swept:

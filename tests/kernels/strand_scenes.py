@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from named_strands import helix
 from numpy.typing import NDArray
 
 from pipeline import kernels
@@ -126,6 +127,12 @@ def hairy_sphere(strand: Points, count: int, radius: float = 0.09, offset: float
         lift = rotation(tuple(axis), np.arctan2(np.linalg.norm(axis), n[0]))
         strands.append((radius + offset) * n + (strand - strand[0]) @ (lift @ rotation((1, 0, 0), 2.4 * k)).T)
     return np.array(strands)
+
+
+def curly_head(count: int, precision: type = np.float32) -> tuple[kernels.RestShape, kernels.State]:
+    """Curls of 8 mm radius and 25 cm length on a sphere, at rest."""
+    points = hairy_sphere(helix(0.008, 0.02, 0.25, 32), count)
+    return shape(points), kernels.at_rest(points.astype(precision))
 
 
 ARRAYS = ("points", "velocity", "tension", "contact", "directors", "twist")

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from strand_scenes import (
     bundle,
     copy,
+    curly_head,
     drive,
-    hairy_sphere,
     same,
     settings,
     shake,
@@ -31,11 +31,6 @@ def grid(rest: kernels.RestShape, hold: int = 1, **values: float) -> kernels.Hai
     """The grid with the parameters of the table that `test_a_bundle_keeps_its_width` compares with."""
     chosen = {"cell": 8e-3, "density": 0.15, "pressure": 0.05, "drag": 3.0, "limit": 50.0} | values
     return kernels.HairGrid(rest, **chosen, hold=hold)
-
-
-def curly_head(count: int, precision: type = np.float32) -> Head:
-    points = hairy_sphere(helix(0.008, 0.02, 0.25, 32), count)
-    return shape(points), kernels.at_rest(points.astype(precision))
 
 
 def stirred(count: int, precision: type) -> Head:

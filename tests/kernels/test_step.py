@@ -10,8 +10,8 @@ from strand_scenes import (
     FREE,
     STILL,
     copy,
+    curly_head,
     drive,
-    hairy_sphere,
     roots,
     rotation,
     same,
@@ -26,11 +26,6 @@ from pipeline import kernels
 
 Points = NDArray[np.float64]
 every_model = pytest.mark.parametrize("torsion", ["kirchhoff", "rotor"])
-
-
-def curly_head(count: int, precision: type = np.float32) -> tuple[kernels.RestShape, kernels.State]:
-    points = hairy_sphere(helix(0.008, 0.02, 0.25, 32), count)
-    return shape(points), kernels.at_rest(points.astype(precision))
 
 
 @every_model

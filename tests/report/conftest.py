@@ -3,17 +3,16 @@
 from pathlib import Path
 
 import pytest
+from fake_ringlet import fake
 from small_runs import BASE, CONFIG, Make, stage
 
-from pipeline.batch.stages import Batch
 from pipeline.cli.main import call
 
 
 @pytest.fixture
 def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
     """Run a config under a name, with settings; returns the experiment's folder."""
-    monkeypatch.setattr(Batch, "execute", stage)
-    monkeypatch.setattr("pipeline.config.keys.code_version", lambda _stage: "fixed")
+    fake(monkeypatch, stage)
     (tmp_path / "base.toml").write_text(BASE)
 
     def run(name: str, *settings: str, code: int = 0, command: str = "run") -> Path:

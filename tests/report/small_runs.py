@@ -1,18 +1,16 @@
 """Small runs with stages that take no time, and figures in guides.h5."""
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from fake_ringlet import FIGURES, execute
+from small_configs import ONE_LIGHT, SWATCH
 
 from pipeline import cache
 from pipeline.batch.stages import Batch
 from pipeline.config import provenance
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "cli"))
-from fake_ringlet import execute
 
 CONFIG = """\
 extends = "base.toml"
@@ -20,16 +18,8 @@ extends = "base.toml"
 frames = 5
 theta = 0.6
 """
-BASE = """\
-[scene]
-head = "none"
-[groom]
-source = "swatch"
-[[scene.lights]]
-direction = [0, 1, 0]
-irradiance = 4.0
-"""
-NAMES = ("bending", "torsion", "kinetic", "gravity", "strain", "penetration", "contacts", "rounds")
+BASE = SWATCH + ONE_LIGHT
+NAMES = (*FIGURES, "rounds")
 
 Make = Callable[..., Path]
 

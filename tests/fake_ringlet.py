@@ -2,7 +2,9 @@
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +13,15 @@ from pipeline.batch.stages import Batch
 from pipeline.cli.main import main
 from pipeline.config import keys, provenance
 
+if TYPE_CHECKING:
+    import pytest
+
+Execute = Callable[[Batch, str, tuple[int, ...]], None]
 FIGURES = ("bending", "torsion", "kinetic", "gravity", "strain", "penetration", "contacts")
 
 
 def execute(batch: Batch, stage: str, frames: tuple[int, ...]) -> None:
+    """In place of `Batch.execute`."""
     log(f"{stage} {' '.join(str(frame) for frame in frames)}".rstrip())
     key, record = batch.keys[stage], provenance(batch.config, stage)
     if stage == "render":
@@ -36,6 +43,12 @@ def log(line: str) -> None:
     if path := os.environ.get("RINGLET_TEST_LOG"):
         with Path(path).open("a") as file:
             file.write(line + "\n")
+
+
+def fake(monkeypatch: "pytest.MonkeyPatch", stages: Execute = execute) -> None:
+    """For one test: these stages in place of the real ones, and keys that no change of code touches."""
+    monkeypatch.setattr(Batch, "execute", stages)
+    monkeypatch.setattr("pipeline.config.keys.code_version", lambda _stage: "fixed")
 
 
 if __name__ == "__main__":
