@@ -10,8 +10,8 @@ from strand_scenes import (
     STILL,
     bundle,
     copy,
+    curly_head,
     drive,
-    hairy_sphere,
     same,
     settings,
     shake,
@@ -219,8 +219,7 @@ def test_what_is_groomed_together_stays() -> None:
 
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 def test_result_depends_neither_on_threads_nor_on_the_split_of_the_steps(precision: type) -> None:
-    points = hairy_sphere(helix(0.008, 0.02, 0.25, 32), 200)
-    rest, first = shape(points), kernels.at_rest(points.astype(precision))
+    rest, first = curly_head(200, precision)
     states = []
     for threads, chunk in ((1, 24), (2, 24), (3, 8)):
         kernels.set_threads(threads)
@@ -235,8 +234,7 @@ def test_result_depends_neither_on_threads_nor_on_the_split_of_the_steps(precisi
 
 
 def test_bad_numbers_do_not_reach_the_neighbours() -> None:
-    points = hairy_sphere(helix(0.008, 0.02, 0.25, 32), 40)
-    rest, state = shape(points), kernels.at_rest(points)
+    rest, state = curly_head(40, np.float64)
     state.points[9, 12, 1] = np.nan
     report = kernels.advance(state, rest, sphere(), drive(24), settings(), capsules(rest))
     assert report.bad_strand == 9

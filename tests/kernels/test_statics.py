@@ -5,12 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import rod_twin
+from named_strands import helix
 from scipy.linalg import eigh, null_space
 from scipy.optimize import nnls
 from strand_scenes import BENDING, MASS_PER_LENGTH, TWISTING, Points, roots, rotation, shape
 
 from pipeline import kernels
-from tests.conftest import helix
 
 GRAVITY = np.array([0.0, -9.81, 0.0])
 

@@ -1,11 +1,8 @@
 """What is slow to make and serves many tests: the mannequin, and a groom on it."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
+from shipped_configs import shipped
 
-from pipeline.config import load
 from pipeline.config.schema import Config
 from pipeline.groom.heads import Head, make_head
 from pipeline.groom.procedural import Style
@@ -18,15 +15,6 @@ def mannequin() -> Head:
     head = make_head(Config(name="mannequin"))
     assert head is not None
     return head
-
-
-ROOT = Path(__file__).parents[2]
-
-
-def shipped(name: str, **groom: Any) -> Config:
-    """The groom of a shipped config, with other values."""
-    config = load(ROOT / f"configs/{name}.toml").config
-    return config.model_copy(update={"groom": config.groom.model_copy(update=groom)})
 
 
 @pytest.fixture(scope="session")

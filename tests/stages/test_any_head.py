@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+from shipped_configs import shipped
 
 from pipeline import cache
 from pipeline.cache.expansion import placement
@@ -19,7 +20,6 @@ from pipeline.groom.heads import Head, make_head
 from pipeline.groom.procedural import Style
 from pipeline.render.camera import CameraPath
 from pipeline.simulate.motion import head_motion
-from tests.stages.conftest import shipped
 
 pv = pytest.importorskip("pyvista")
 

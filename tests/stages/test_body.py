@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from guided_runs import interrupted, resumed
 from numpy.typing import NDArray
 from PIL import Image
 from test_head_mesh import ball, write_obj
@@ -246,16 +247,8 @@ def test_a_resumed_run_on_a_deforming_skin_is_bit_identical(tmp_path: Path) -> N
     points, _ = rest_mesh()
     config, experiment = project(tmp_path, [bent(points, 0.1 * k) for k in range(FRAMES - 2)])
     guides = stage.read_guides(experiment)[0]
-    whole = Simulation(config.simulate, 1, guides)
-    whole.settle()
-    frames = []
-    for frame in stage.run(whole):
-        frames.append(frame)
-        if len(frames) == 3:
-            saved = {name: array.copy() for name, array in whole.save().items()}
-    resumed = Simulation(config.simulate, 1, guides)
-    resumed.restore(saved)
-    again = list(stage.run(resumed, start=3))
+    frames, saved = interrupted(config.simulate, guides, after=3)
+    again = resumed(config.simulate, guides, 3, saved)
     assert [a.points.tobytes() for a in again] == [b.points.tobytes() for b in frames[3:]]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from shipped_configs import shipped
 
 from pipeline import cache
 from pipeline.config.schema import Config, Contact, Curl, Groom, Scene, Swatch
@@ -19,7 +20,6 @@ from pipeline.groom.roots import Factor, place_roots
 from pipeline.groom.swatch import swatch
 from pipeline.strands.random import normal, uniform
 from pipeline.strands.strands import Strands
-from tests.stages.conftest import shipped
 
 COLUMNS = ("points", "held", "normal", "key")
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from shipped_configs import shipped
 
 from pipeline.body.distance import Grid
 from pipeline.body.normals import point_normals
@@ -18,7 +19,6 @@ from pipeline.groom.head_field import Field
 from pipeline.groom.head_mesh import load_mesh
 from pipeline.groom.heads import make_head
 from pipeline.groom.procedural import Style
-from tests.stages.conftest import shipped
 
 SHARED = Path(__file__).parents[2].parent / "shared/data/heads"
 HEADS = {

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from named_strands import helix
 from numpy.typing import NDArray
 
 from pipeline.config.schema import Hair, Interpolate, Simulate
@@ -15,7 +16,6 @@ from pipeline.strands.expand import Binding, Expansion
 from pipeline.strands.follow import GuideSet, shape_of
 from pipeline.strands.held import held_ends
 from pipeline.strands.partings import Neighbours, Partings
-from tests.conftest import helix
 
 Floats = NDArray[np.float64]
 

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from named_strands import helix
 
 from pipeline.validation.interpolation import Plan, Report, measure, merged
 from pipeline.validation.interpolation.forces import in_equilibrium
@@ -11,7 +12,6 @@ from pipeline.validation.interpolation.grooms import HEAD, KINDS, LENGTH, groom,
 from pipeline.validation.interpolation.measures import distance, error
 from pipeline.validation.interpolation.methods import Following, turns
 from pipeline.validation.interpolation.scene import scene
-from tests.conftest import helix
 
 CURLY = next(kind for kind in KINDS if kind.name == "curly")
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from shipped_configs import shipped
 
 from pipeline import cache
 from pipeline.cache.partings import read_partings
@@ -20,7 +21,6 @@ from pipeline.groom.procedural import Style
 from pipeline.interpolate import stage as interpolate_stage
 from pipeline.strands.chart import Chart
 from pipeline.strands.partings import NOBODY, Partings
-from tests.stages.conftest import shipped
 
 ZIGZAG = tuple((0.04 * (-1) ** k, 0.08 * k) for k in range(10))
 BOX = ((-0.1, 0.3), (0.1, 0.3), (0.1, 0.45), (-0.1, 0.45))

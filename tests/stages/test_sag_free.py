@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from guided_runs import experiment_with_groom
+from named_strands import helix
 from numpy.typing import NDArray
 
-from pipeline import cache, kernels
+from pipeline import kernels
 from pipeline.cli.inspect import contents
 from pipeline.config import load
 from pipeline.config.schema import Config, Contact, Hair, Keyframe, Motion, SagFree, Simulate
@@ -21,7 +23,6 @@ from pipeline.simulate.screws import rotation_matrix
 from pipeline.simulate.stepper import Guides, Simulation
 from pipeline.strands.held import held_ends
 from pipeline.strands.strands import Strands
-from tests.conftest import helix
 
 REPOSITORY = Path(__file__).parents[2]
 SHAKE = Motion(preset="shake", amplitude=np.pi / 3, period=0.5, swings=2, pivot=(0.0, 0.0, 0.0))
@@ -288,12 +289,7 @@ def test_models_that_cannot_hold_a_groom_are_refused(torsion: str, tmp_path: Pat
 
 def test_the_report_is_kept_with_the_guides(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     guides = free_grooms("curly")
-    experiment = cache.Experiment(tmp_path)
-    with cache.create(experiment.groom, kind="groom", key="groom") as writer:
-        writer.write("strands/points", guides.points)
-        writer.write("strands/held", guides.held)
-        writer.write("guides/strand", np.arange(len(guides.points), dtype=np.uint32))
-        writer.write("guides/offset", guides.offset)
+    experiment = experiment_with_groom(tmp_path, guides)
     simulate = HELD.model_copy(update={"settle": 0.5, "frames": 2})
     stage.execute(Config(name="test", simulate=simulate), experiment, "key")
     said = capsys.readouterr().err

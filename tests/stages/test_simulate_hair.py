@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from guided_runs import interrupted, resumed
 
 from pipeline import cache, kernels
 from pipeline.bench.simulate import curly_head, round_head
@@ -29,19 +30,11 @@ def short(method: str, **values: float) -> Simulate:
 def test_a_resumed_run_is_bit_identical_for_any_number_of_threads(method: str) -> None:
     simulate, guides = short(method), curly_head(150, 16)
     kernels.set_threads(2)
-    whole = Simulation(simulate, 3, guides)
-    whole.settle()
-    frames = []
-    for frame in stage.run(whole):
-        frames.append(frame.points.tobytes())
-        if len(frames) == 2:
-            saved = {name: array.copy() for name, array in whole.save().items()}
+    frames, saved = interrupted(simulate, guides, after=2)
     kernels.set_threads(1)
-    resumed = Simulation(simulate, 3, guides)
-    resumed.restore(saved)
-    rest = [frame.points.tobytes() for frame in stage.run(resumed, start=2)]
+    rest = resumed(simulate, guides, 2, saved)
     kernels.set_threads(0)
-    assert rest == frames[2:]
+    assert [frame.points.tobytes() for frame in rest] == [frame.points.tobytes() for frame in frames[2:]]
 
 
 @every_method

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from guided_runs import experiment_with_groom, interrupted, resumed, simulated
 
 from pipeline import cache, kernels
 from pipeline.bench.scaling import scaling
@@ -30,12 +31,6 @@ def guides() -> Guides:
     return round_head(GUIDES, POINTS)
 
 
-def simulated(simulate: Simulate, guides: Guides) -> list[cache.Frame]:
-    simulation = Simulation(simulate, seed=3, guides=guides)
-    simulation.settle()
-    return list(stage.run(simulation))
-
-
 def bytes_of(frames: list[cache.Frame]) -> list[bytes]:
     return [
         frame.points.tobytes() + frame.pose.tobytes() + repr(frame.diagnostics).encode() for frame in frames
@@ -45,16 +40,8 @@ def bytes_of(frames: list[cache.Frame]) -> list[bytes]:
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_a_resumed_run_is_bit_identical(guides: Guides, precision: str) -> None:
     simulate = SHORT.model_copy(update={"precision": precision})
-    whole = Simulation(simulate, 3, guides)
-    whole.settle()
-    frames = []
-    for frame in stage.run(whole):
-        frames.append(frame)
-        if len(frames) == 3:
-            saved = {name: array.copy() for name, array in whole.save().items()}
-    resumed = Simulation(simulate, 3, guides)
-    resumed.restore(saved)
-    assert bytes_of(list(stage.run(resumed, start=3))) == bytes_of(frames[3:])
+    frames, saved = interrupted(simulate, guides, after=3)
+    assert bytes_of(resumed(simulate, guides, 3, saved)) == bytes_of(frames[3:])
 
 
 def test_guides_do_not_depend_on_the_number_of_threads(guides: Guides) -> None:
@@ -184,20 +171,10 @@ CONFIG = Config(
 )
 
 
-def experiment_with_groom(folder: Path, guides: Guides) -> cache.Experiment:
-    experiment = cache.Experiment(folder)
-    with cache.create(experiment.groom, kind="groom", key="groom") as writer:
-        writer.write("strands/points", guides.points)
-        writer.write("strands/held", guides.held)
-        writer.write("guides/strand", np.arange(len(guides.points), dtype=np.uint32))
-        writer.write("guides/offset", guides.offset)
-    return experiment
-
-
 def test_a_killed_run_goes_on_to_the_same_file(tmp_path: Path) -> None:
-    whole = experiment_with_groom(tmp_path / "whole", swatch())
+    undisturbed = experiment_with_groom(tmp_path / "whole", swatch())
     killed = experiment_with_groom(tmp_path / "killed", swatch())
-    stage.execute(CONFIG, whole, "key")
+    stage.execute(CONFIG, undisturbed, "key")
     program = f"""
 import os, signal
 from pathlib import Path
@@ -221,7 +198,7 @@ stage.execute(Config.model_validate_json({CONFIG.model_dump_json()!r}), cache.Ex
     assert done == stage.CHECKPOINT_FRAMES
     assert not killed.guides.exists()
     stage.execute(CONFIG, killed, "key")
-    with cache.open_guides(whole.guides) as one, cache.open_guides(killed.guides) as other:
+    with cache.open_guides(undisturbed.guides) as one, cache.open_guides(killed.guides) as other:
         assert one.frames == other.frames == 20
         for index in range(one.frames):
             assert np.array_equal(one.frame(index), other.frame(index))

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from guided_runs import simulated
 
 from pipeline import cache
 from pipeline.bench.simulate import round_head
 from pipeline.config.schema import HairContact, Keyframe, Motion, Simulate
-from pipeline.simulate import stage
-from pipeline.simulate.stepper import Guides, Simulation
+from pipeline.simulate.stepper import Guides
 
 SHAKE = Motion(preset="shake", period=0.4, amplitude=0.6, pivot=(0.0, -0.05, 0.0))
 SHORT = Simulate(
@@ -25,12 +25,6 @@ SHORT = Simulate(
 @pytest.fixture
 def guides() -> Guides:
     return round_head(21, 16)
-
-
-def simulated(simulate: Simulate, guides: Guides) -> list[cache.Frame]:
-    simulation = Simulation(simulate, seed=3, guides=guides)
-    simulation.settle()
-    return list(stage.run(simulation))
 
 
 def written(frames: list[cache.Frame], folder: Path) -> cache.Experiment:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+from shipped_configs import shipped
 
 from pipeline.config.formula import VARIABLES
 from pipeline.config.schema import Lengths, VariedFraction, VariedLength
@@ -15,7 +16,6 @@ from pipeline.groom.heads import Head
 from pipeline.groom.procedural import Style
 from pipeline.groom.style.fields import Scalp, noise, varied
 from pipeline.strands.spacing import arc_length
-from tests.stages.conftest import shipped
 
 COUNT = 500
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from shipped_configs import shipped
 
 from pipeline.config.schema import (
     Clump,
@@ -28,7 +29,6 @@ from pipeline.groom.style.stack import OPERATORS, Stack
 from pipeline.strands.chart import Chart
 from pipeline.strands.partings import Neighbours, Partings
 from pipeline.strands.spacing import arc_length
-from tests.stages.conftest import shipped
 
 SEED, POINTS, COUNT = 3, 200, 400
 CURL: dict[str, Any] = {

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from shipped_configs import shipped
 
 from pipeline import cache
 from pipeline.cache.expansion import expansion_from
@@ -19,7 +20,6 @@ from pipeline.interpolate import stage as interpolate_stage
 from pipeline.simulate import stage as simulate_stage
 from pipeline.strands.spacing import arc_length
 from pipeline.strands.strands import Strands
-from tests.stages.conftest import shipped
 from tests.stages.test_style_operators import styled
 
 COUNT = 1500
