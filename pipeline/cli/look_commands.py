@@ -1,4 +1,4 @@
-"""Commands that look and change nothing: status, plan, config, inspect."""
+"""Commands that look and make nothing again: status, plan, config, inspect; report and diff, about runs."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,6 +18,8 @@ from pipeline.cli.base import (
     print_json,
 )
 from pipeline.errors import InputError
+
+Run = Annotated[Path, Parameter(help="The folder of a run, such as outputs/default, or its config.")]
 
 
 @app.command(group=LOOK_GROUP, sort_key=1)
@@ -113,6 +115,48 @@ def inspect(
     else:
         _print_contents(found)
     return 0 if found["valid"] else 1
+
+
+@app.command(group=LOOK_GROUP, sort_key=5)
+def report(config: ConfigFile, *, settings: Settings = (), outputs: Outputs = OUTPUTS) -> None:
+    """Write outputs/<name>/report.html: frames, times, energies, warnings, values, versions and keys of a run."""
+    from pipeline.report import write_run_page
+
+    loaded = load_config(config, settings)
+    print(write_run_page(loaded, experiment_of(loaded, outputs)))
+
+
+@app.command(group=LOOK_GROUP, sort_key=6)
+def diff(
+    first: Run,
+    second: Run,
+    *,
+    page: Annotated[Path | None, Parameter(help="Write an HTML page of frames that differ.")] = None,
+    outputs: Outputs = OUTPUTS,
+    json: Json = False,
+) -> int:
+    """Tell which values, versions and frames differ between two runs; exit code 1 when something does."""
+    from pipeline.cache import Experiment, replacing
+    from pipeline.report.diff import diff as difference_of
+    from pipeline.report.diff import pairs_of
+
+    one, other = (
+        experiment_of(load_config(path, ()), outputs) if path.suffix == ".toml" else Experiment(path)
+        for path in (first, second)
+    )
+    found = difference_of(one, other)
+    if page is not None:
+        from pipeline.compare.page import comparison_page
+
+        with replacing(page) as temporary:
+            temporary.write_text(
+                comparison_page(f"{first} and {second}", pairs_of(found, one, other)), "utf-8"
+            )
+    if json:
+        print_json(found.as_json())
+    else:
+        print("\n".join(found.lines()))
+    return 0 if found.equal else 1
 
 
 def _print_contents(found: dict[str, Any]) -> None:

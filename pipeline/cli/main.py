@@ -16,7 +16,6 @@ from pipeline.cli import (  # noqa: F401, they add their commands
     exchange_commands,
     farm_commands,
     look_commands,
-    report_commands,
     run_commands,
     signals,
     sweep_commands,

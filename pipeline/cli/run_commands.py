@@ -162,13 +162,13 @@ def _make(
 ) -> None:
     """Make a stage and whatever it needs; `everything` also makes the stages before it that it does not need."""
     from pipeline.cli.machine import refuse_bare_start
-    from pipeline.cli.report_commands import write_report
 
     log.use(manner.log_format)
     refuse_bare_start()  # before anything large is loaded
     from pipeline.batch.stages import NEEDS, Batch
     from pipeline.cache import where_writable
     from pipeline.config import STAGES
+    from pipeline.report import write_run_page
 
     if stage not in STAGES:
         raise InputError(f"--until {stage}: expected one of {', '.join(STAGES)}")
@@ -188,7 +188,7 @@ def _make(
         batch.make(stage, wanted if stage == "render" else None)
         if stage == "render" and wanted is None:
             with where_writable():
-                write_report(loaded, batch.experiment)
+                write_run_page(loaded, batch.experiment)
 
 
 def refuse_what_does_not_fit(

@@ -43,6 +43,19 @@ class Check:
     metrics: dict[str, float] | None = None
     limits: dict[str, float] | None = None
 
+    @classmethod
+    def of(
+        cls,
+        golden: Path,
+        new: Path,
+        reasons: list[str],
+        metrics: Metrics | None = None,
+        limits: Limits | None = None,
+    ) -> "Check":
+        """What a comparison of two files found."""
+        figures = (asdict(each) if each else None for each in (metrics, limits))
+        return cls(golden.name, str(golden), str(new), reasons, "", *figures)
+
     def pair(self) -> Pair:
         """What the page shows."""
         golden = Path(self.golden)
@@ -59,44 +72,23 @@ class Check:
 def check_picture(golden: Path, new: Path, limits: Limits) -> Check:
     """Compare a new picture file with its golden one: equal pixels of one renderer, else within limits."""
     if not golden.is_file():
-        return Check(
-            golden.name,
-            str(golden),
-            str(new),
-            ["no golden picture yet; look at the new one, then approve it"],
-        )
+        return Check.of(golden, new, ["no golden picture yet; look at the new one, then approve it"])
     try:
         pair = judged(golden.name, golden, new, limits)
     except InputError as error:
-        return Check(golden.name, str(golden), str(new), [str(error)])
-    metrics = None if pair.metrics is None else asdict(pair.metrics)
-    return Check(
-        golden.name,
-        str(golden),
-        str(new),
-        pair.reasons,
-        "",
-        metrics,
-        asdict(pair.limits) if pair.limits else None,
-    )
+        return Check.of(golden, new, [str(error)])
+    return Check.of(golden, new, pair.reasons, pair.metrics, pair.limits)
 
 
 def check_figures(golden: Path, new: Path, relative: float, absolute: float) -> Check:
     """Compare figures, JSON files of one object, value by value: numbers with a point within the larger tolerance, all else equal."""
     if not golden.is_file():
-        return Check(
-            golden.name,
-            str(golden),
-            str(new),
-            ["no golden figures yet; look at the new ones, then approve them"],
-        )
+        return Check.of(golden, new, ["no golden figures yet; look at the new ones, then approve them"])
     try:
         expected, found = json.loads(golden.read_text("utf-8")), json.loads(new.read_text("utf-8"))
     except ValueError as error:
-        return Check(golden.name, str(golden), str(new), [f"{golden}: not JSON ({error})"])
-    return Check(
-        golden.name, str(golden), str(new), list(_differences("", expected, found, relative, absolute))
-    )
+        return Check.of(golden, new, [f"{golden}: not JSON ({error})"])
+    return Check.of(golden, new, list(_differences("", expected, found, relative, absolute)))
 
 
 def file_name(name: str, ending: str) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline import cache
 from pipeline.batch.stages import Batch
+from pipeline.cache.atomic import remove_stale
 from pipeline.compare import load_picture
 from pipeline.compare.pictures import displayed
 from pipeline.config import STAGES, Loaded
@@ -41,6 +42,16 @@ def run_page(loaded: Loaded, experiment: cache.Experiment) -> str:
         _messages(said),
     ]
     return document(f"{loaded.config.name}: report", body, [_HERE / "report.css"])
+
+
+def write_run_page(loaded: Loaded, experiment: cache.Experiment) -> Path:
+    """Write the page into the experiment's folder; returns its path."""
+    remove_stale(
+        experiment.folder
+    )  # of a process that was killed here; a run with nothing to do removes nothing else
+    with cache.replacing(experiment.report) as temporary:
+        temporary.write_text(run_page(loaded, experiment), "utf-8")
+    return experiment.report
 
 
 def _summary(loaded: Loaded, stale: Sequence[str]) -> str:

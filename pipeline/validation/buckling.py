@@ -1,6 +1,7 @@
 """Straight strands that give way: under their own weight, and pushed at their ends."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.validation.case import Law, Model, Outcome, Reading
 from pipeline.validation.rod import (
@@ -10,6 +11,7 @@ from pipeline.validation.rod import (
     Rod,
     clamped,
     gravito_length,
+    leaning,
     settling,
     straight,
     undamped,
@@ -19,7 +21,7 @@ GREENHILL = 7.837347  # critical w L^3/B of an upright rod
 EULER = 20.19  # critical load P L^2/B, clamped and hinged: the first root of tan(x) = x, squared
 
 
-def first_fallen(values: Array, fallen: Array) -> float:
+def first_fallen(values: Array, fallen: NDArray[np.bool_]) -> float:
     """Where a sorted row of strands begins to give way; nan unless it is a row of upright ones, then fallen ones."""
     first = int(np.argmax(fallen)) if fallen.any() else 0
     if first == 0 or not fallen[first:].all():
@@ -33,13 +35,10 @@ def self_buckling(model: Model, _quick: bool, points: int = 64) -> Outcome:
     strands = np.concatenate([straight(gravito_length(gamma), points, (0, 1, 0)) for gamma in gammas])
     settings = undamped(model, dt=4e-3, theta=0.5)
     settings.gravity = (0.0, -GRAVITY, 0.0)
-    lean = 1e-5 * np.linspace(0, 1, points) ** 2
-    lean[:2] = 0
-    leaning = strands.copy()
-    leaning[:, :, 0] += lean
-    rod = Rod(strands, clamped(points), settings, start=leaning)
+    lean = 1e-5
+    rod = Rod(strands, clamped(points), settings, start=leaning(strands, 0, lean))
     rod.advance(2000)
-    fallen = np.abs(rod.state.points[:, -1, 0]) > 30 * lean[-1]
+    fallen = np.abs(rod.state.points[:, -1, 0]) > 30 * lean
     return Outcome((Reading("critical Gamma", first_fallen(gammas, fallen), GREENHILL, 0.01),))
 
 

@@ -63,6 +63,16 @@ def _legend(axes: Any, **labels: Any) -> None:
     axes.legend(frameon=False, fontsize="small")
 
 
+def _legend_below(figure: Any, axes: Any, columns: int) -> None:
+    figure.legend(
+        *axes.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=columns,
+        frameon=False,
+        fontsize="x-small",
+    )
+
+
 def _cantilever(figure: Any, results: Sequence[CaseResult]) -> None:
     axes = figure.add_subplot()
     gammas, ratios = [*CANTILEVER], [*CANTILEVER.values()]
@@ -161,13 +171,7 @@ def _energy(figure: Any, results: Sequence[CaseResult]) -> None:
         axes.set(xlabel="time [s]", title=title, ylabel="" if column else "energy / largest kinetic energy")
         axes.title.set_fontsize("medium")
         axes.grid(alpha=0.25)
-    figure.legend(
-        *axes.get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=7,
-        frameon=False,
-        fontsize="x-small",
-    )
+    _legend_below(figure, axes, columns=7)
 
 
 def _vibration(figure: Any, results: Sequence[CaseResult]) -> None:
@@ -182,13 +186,7 @@ def _vibration(figure: Any, results: Sequence[CaseResult]) -> None:
         axes.set(ylabel="tip height", title=name)
         axes.grid(alpha=0.25)
     axes.set(xlabel="time [periods of the reference]")
-    figure.legend(
-        *axes.get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=5,
-        frameon=False,
-        fontsize="x-small",
-    )
+    _legend_below(figure, axes, columns=5)
 
 
 def _push(figure: Any, results: Sequence[CaseResult]) -> None:

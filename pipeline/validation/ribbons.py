@@ -5,13 +5,14 @@ differences of the kernels' forces, among the displacements that keep all length
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
 
 from pipeline import kernels
 from pipeline.validation.buckling import first_fallen
 from pipeline.validation.case import Law, Model, Outcome, Reading
-from pipeline.validation.rod import BENDING, GRAVITY, WEIGHT, Array, Rod, clamped, straight, undamped
+from pipeline.validation.rod import BENDING, GRAVITY, WEIGHT, Array, Rod, clamped, leaning, straight, undamped
 
 PRANDTL = 12.854  # critical w L^3 over sqrt(B2 C) of a thin cantilever under its own weight
 GREENHILL_TWIST = 8.98682  # critical turn [rad] over B/C of a straight rod, clamped at both ends
@@ -28,7 +29,7 @@ def lateral(model: Model, quick: bool) -> Outcome:
     return Outcome(tuple(readings))
 
 
-def _ribbons(model: Model, points: int) -> tuple[Array, Array]:
+def _ribbons(model: Model, points: int) -> tuple[Array, NDArray[np.bool_]]:
     """Critical figures of 21 ribbons, and which of them fall to the side."""
     figures = PRANDTL * (1 + np.linspace(-0.03, 0.03, 21))
     soft, thick = BENDING, 1000 * BENDING
@@ -37,10 +38,8 @@ def _ribbons(model: Model, points: int) -> tuple[Array, Array]:
     strands = np.concatenate([straight(length, points) for length in lengths])
     settings = undamped(model, dt=4e-3, theta=1.0)
     settings.gravity = (0.0, -GRAVITY, 0.0)
-    aside = 1e-6 * np.linspace(0, 1, points) ** 2
-    aside[:2] = 0
-    start = strands.copy()
-    start[:, :, 2] += aside
+    aside = 1e-6
+    start = leaning(strands, 2, aside)
     rod = Rod(strands, clamped(points), settings, bending=thick, twisting=wring, start=start)
     rod.rest.bending_2 = np.full(len(figures), soft)
     upright = np.tile([0.0, 1.0, 0.0], (len(figures), points - 1, 1))
@@ -49,7 +48,7 @@ def _ribbons(model: Model, points: int) -> tuple[Array, Array]:
     along /= np.linalg.norm(along, axis=2, keepdims=True)
     rod.state.directors[:] = upright - (upright * along).sum(axis=2, keepdims=True) * along
     rod.advance(3000)
-    return figures, np.abs(rod.state.points[:, -1, 2]) > 30 * aside[-1]
+    return figures, np.abs(rod.state.points[:, -1, 2]) > 30 * aside
 
 
 def twisted_rod(_model: Model, quick: bool) -> Outcome:

@@ -48,6 +48,15 @@ def clamped(points: int, tip: int = 0) -> list[int]:
     return [HEAD] * 2 + [0] * (points - 2 - tip) + [HAND] * tip
 
 
+def leaning(strands: Array, axis: int, tip: float) -> Array:
+    """Strands (S, P, 3) [m] pushed off along a coordinate axis by a parabola: the two first points not, the tip by `tip`."""
+    aside = tip * np.linspace(0, 1, strands.shape[1]) ** 2
+    aside[:2] = 0
+    pushed = strands.copy()
+    pushed[:, :, axis] += aside
+    return pushed
+
+
 def undamped(model: Model = "none", dt: float = 1 / 240, theta: float = 0.5) -> kernels.StepSettings:
     """Steps in vacuum without internal damping and without gravity."""
     settings = kernels.StepSettings()
