@@ -187,7 +187,7 @@ class State:
     tension: _Real
     """(S, P-1) [N]: carried from step to step, so that equilibria do not depend on dt."""
     contact: NDArray[np.uint8]
-    """(S, P): 1 where the head pushed the point in the last step."""
+    """(S, P): 1 where the solve of the last step pressed the point against the head, 2 where only lengths did, else 0."""
     directors: _Real
     """(S, P-1, 3): unit director of every segment, world; only torsion "kirchhoff" changes them."""
     twist: _Real

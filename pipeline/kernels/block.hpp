@@ -77,7 +77,7 @@ template <class Real> struct Motion {
     Vec3<Real> *m;      // director of segment j, unit
     Lanes<Real> *twist; // at point i, see kirchhoff.hpp
     Lanes<Real> *T;     // tension of segment j, positive when pulled
-    Lanes<Real> *touch; // 1 where the head pushed the point in the last step
+    Lanes<Real> *touch; // in the last step: 1 pressed by the solve against the head, 2 by lengths only, else 0
 
     Motion(Arena &arena, int P)
         : x(arena.take<Vec3<Real>>(P)), v(arena.take<Vec3<Real>>(P)), m(arena.take<Vec3<Real>>(P)),

@@ -150,10 +150,13 @@ template <class Real> struct Contacts {
         return true;
     }
 
-    /// Step a: which points get a row, from their predicted positions.
+    /// Step a: which points get a row, from their predicted positions. One that did not press in the last step may go as
+    /// deep as is let pass: hair that lies still has points that lengths push by a thousandth of that, step after step,
+    /// whose rows would only pull and make a second solve.
     void find_rows(const Block<Real> &b, const HeadStep<Real> &head, const Motion<Real> &from, Real dt) {
         any_row = false;
         if (head.deformation) age(b.P, Real(std::abs(head.drift) * head.deformation->fastest));
+        const L passed = splat(Real(-kDepth)), keep = splat(Real(kKeepGap));
         for (int i = 0; i < b.P; ++i) {
             row[i] = none, a[i] = none, s[i] = none, fresh[i] = none, stuck[i] = none, N[i] = none;
             if (!head.field || i < b.first) continue;
@@ -164,7 +167,7 @@ template <class Real> struct Contacts {
             const Vec3<Real> predicted = from.x[i] + splat(dt) * from.v[i];
             if (!near(head, i, predicted, reach, b.free[i] > none, distance, normal)) continue;
             L g = distance - b.offset[i];
-            Mask<Real> on = (b.free[i] > none) & ((g < none) | ((from.touch[i] > none) & (g < Real(kKeepGap))));
+            const Mask<Real> on = (b.free[i] > none) & (g < select<Real>(from.touch[i] == one, keep, passed));
             row[i] = select<Real>(on, one, none);
             gap[i] = select<Real>(g > none, Real(kKeepWeight) * g, g);
             n[i] = select(on, normal, n[i]);
@@ -197,9 +200,10 @@ template <class Real> struct Contacts {
     }
 
     /// Steps d1 and d2 for the lanes that are busy: pushes points out, then friction against the head's motion with
-    /// the new part of s as budget. Returns the depth of each lane before the push.
+    /// the new part of s as budget. Returns the depth of each lane before the push. `solved`: no lengths have moved
+    /// points since the solve, which is then what presses.
     L push(const Block<Real> &b, const HeadStep<Real> &head, const Vec3<Real> *old, Real friction, Mask<Real> busy,
-           Motion<Real> &to) {
+           bool solved, Motion<Real> &to) {
         L deepest = none;
         if (!head.field) return deepest;
         for (int i = b.first; i < b.P; ++i) {
@@ -215,7 +219,8 @@ template <class Real> struct Contacts {
             if (!any<Real>((depth + fresh[i]) > none)) continue;
             to.x[i] = to.x[i] + depth * n[i];
             a[i] = select<Real>(depth > none, one, a[i]);
-            to.touch[i] = select<Real>(depth > none, one, to.touch[i]);
+            const L touch = solved ? one : select<Real>(to.touch[i] == one, one, one + one);
+            to.touch[i] = select<Real>(depth > none, touch, to.touch[i]);
             s[i] += depth;
             rub(head, i, old[i], friction, depth, here, to);
         }

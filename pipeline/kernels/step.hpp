@@ -65,9 +65,9 @@ template <class Real> class Stepper {
         std::swap(now, next_);
         if (!field_) return;
         for (int i = block.first; i < block.P; ++i) {
-            L touching = select<Real>(wanted, now.touch[i], L{});
-            if (!any<Real>(touching > 0)) continue;
-            for (int lane = 0; lane < kLanes<Real>; ++lane) tally.contacts += touching[lane];
+            const Mask<Real> touching = wanted & (now.touch[i] > 0);
+            if (!any<Real>(touching)) continue;
+            for (int lane = 0; lane < kLanes<Real>; ++lane) tally.contacts += touching[lane] ? 1 : 0;
         }
     }
 
@@ -237,7 +237,8 @@ template <class Real> class Stepper {
         M busy = wanted;
         L strain{}, depth{};
         for (int round = 0;; ++round) {
-            depth = select<Real>(busy, contacts.push(block, head, from.x, Real(settings_.friction), busy, to), depth);
+            const L pushed = contacts.push(block, head, from.x, Real(settings_.friction), busy, round == 0, to);
+            depth = select<Real>(busy, pushed, depth);
             strain = select<Real>(busy, lengths_.strain(block, to.x), strain);
             M stretched = strain > Real(settings_.tolerance);
             busy = busy & (stretched | (depth > Real(kDepth)));

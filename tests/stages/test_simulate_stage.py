@@ -15,6 +15,7 @@ from pipeline.bench.simulate import bench, round_head
 from pipeline.config.schema import Config, Keyframe, Motion, Simulate
 from pipeline.errors import InputError
 from pipeline.simulate import stage
+from pipeline.simulate.hair_contact import Cost
 from pipeline.simulate.motion import head_motion
 from pipeline.simulate.rest import rest_shape
 from pipeline.simulate.screws import place, rotation_matrix
@@ -234,6 +235,21 @@ def test_the_picture_of_a_run_is_reproducible(tmp_path: Path) -> None:
         pictures.append((experiment.folder / "diagnostics.png").read_bytes())
     assert pictures[0] == pictures[1]
     assert pictures[0].startswith(b"\x89PNG")
+
+
+def test_hair_that_lies_still_is_solved_once_a_step() -> None:
+    """Fine spacing: many contacts would pull if they were tried anew in every step, and the step be solved again."""
+    simulation = Simulation(
+        Simulate(rest="groom", hair_contact={"method": "none"}), seed=1, guides=round_head(64, 64)
+    )
+    simulation.settle()
+    simulation.cost = Cost()
+    for _ in range(5):
+        simulation.next_frame()
+    solves, contacts = simulation.cost.solves / simulation.cost.steps, (simulation.state.contact > 0).sum()
+    print(f"{solves:.3f} solves a step, {contacts} contacts")
+    assert contacts > 64
+    assert solves < 1.1
 
 
 def test_the_bench_measures_what_it_promises() -> None:
