@@ -190,7 +190,7 @@ def bench_farm(
     strands: Count = 4000,
     json: Json = False,
 ) -> None:
-    """Frames by one worker and by several: efficiency, and what a frame costs more."""
+    """Frames by one process and by workers on the same processors: efficiency, and what a frame costs more."""
     from pipeline.farm.bench import bench
 
     _report(bench(frames, workers, size, strands), json)

@@ -31,37 +31,51 @@ def processors() -> int:
     return len(os.sched_getaffinity(0))
 
 
+def share(workers: int) -> int:
+    """How many of this process's processors each of so many workers has; one where there are more workers."""
+    return max(1, processors() // workers)
+
+
+def settings(threads: int) -> dict[str, Any]:
+    """Of Dask, for workers of so many threads and what is around them: the processors are left to the tasks.
+
+    Its watching of itself many times a second took 10 % of a processor where frames are drawn by two workers (measured).
+    """
+    return {
+        "distributed.nanny.pre-spawn-environ": environment(threads),
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.system-monitor.interval": "10s",
+        "distributed.admin.system-monitor.gil.enabled": False,
+        "distributed.scheduler.active-memory-manager.start": False,
+    }
+
+
 def environment(threads: int) -> dict[str, str]:
     """What a worker's process needs in order to leave the other processors to others."""
     return {
         THREADS: str(threads),
         "OMP_NUM_THREADS": str(threads),
         "LP_NUM_THREADS": str(threads),
+        "OPENBLAS_NUM_THREADS": "1",
         "OMP_WAIT_POLICY": "passive",
     }
 
 
 @contextmanager
-def local_cluster(workers: int, threads: int | None = None) -> Iterator[str]:
-    """Start a scheduler and workers on this machine; lends the scheduler's address.
-
-    They share the processors, unless the threads of each are given.
-    """
+def local_cluster(workers: int) -> Iterator[str]:
+    """Start a scheduler and workers that share the processors of this machine; lends the scheduler's address."""
     need_distributed()
     import dask
+    import distributed.config  # noqa: F401, which knows what is not set here
     from distributed import LocalCluster
 
     if workers < 1:
         raise InputError(f"--workers {workers}: expected a number above 0")
-    threads = threads or max(1, processors() // workers)
-    settings = {
-        "distributed.scheduler.allowed-failures": ATTEMPTS,
-        "distributed.nanny.pre-spawn-environ": environment(threads),
-        "distributed.worker.memory.target": False,
-        "distributed.worker.memory.spill": False,
-    }
     with (
-        dask.config.set(settings),
+        dask.config.set(settings(share(workers)) | {"distributed.scheduler.allowed-failures": ATTEMPTS}),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,

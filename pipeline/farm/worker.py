@@ -5,7 +5,7 @@ import logging
 import time
 
 from pipeline.errors import InputError
-from pipeline.farm.cluster import environment, need_distributed, processors
+from pipeline.farm.cluster import need_distributed, processors, settings
 from pipeline.progress import say
 
 _AGAIN_S = 1.0
@@ -23,14 +23,8 @@ def serve(address: str, threads: int | None, patience: float) -> None:
 
     threads = threads or processors()
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    settings = {
-        "distributed.nanny.pre-spawn-environ": environment(threads),
-        "distributed.worker.memory.target": False,
-        "distributed.worker.memory.spill": False,
-        "distributed.comm.timeouts.connect": f"{_CONNECT_S}s",
-    }
     served, last = False, time.monotonic()
-    with dask.config.set(settings):
+    with dask.config.set(settings(threads) | {"distributed.comm.timeouts.connect": f"{_CONNECT_S}s"}):
         while time.monotonic() - last < patience:
             try:
                 asyncio.run(_serve(address, threads))
