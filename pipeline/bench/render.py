@@ -86,13 +86,11 @@ def bench(
         stack.enter_context(_replaced(chunks, "CHUNK", chunk))
         renderer = FrameRenderer(config, expansion, binding.key)
         stack.callback(renderer.close)
-        made = Frames(
-            config,
-            renderer,
+        camera, pictures = (
             CameraPath.of(config.scene.camera, Placement()),
-            _Swinging(guides),
             Pictures(Path(folder), config, "bench"),
         )
+        made = Frames(config, renderer, camera, _Swinging(guides), pictures)
         made.render((1,))
         for owner, name, part in _PARTS:
             stack.enter_context(_timed(owner, name, part, spent))

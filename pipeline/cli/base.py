@@ -41,7 +41,7 @@ Settings = Annotated[
         negative="",
         show_default=False,
         allow_leading_hyphen=True,
-        help='Override a value, as in -s "groom.style.waves.radius=9 mm"; may be repeated.',
+        help='Override a value, as in -s "simulate.hair.radius=45 um"; may be repeated.',
     ),
 ]
 Outputs = Annotated[Path, Parameter(help="Folder that holds a folder for each experiment.")]

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import App, Parameter
 
 from pipeline.cli.base import CHECK_GROUP, OUTPUTS, Json, Outputs, app, print_json
-from pipeline.errors import InputError
+from pipeline.errors import DONE, FAILED, InputError
 
 Flag = Parameter(negative="", show_default=False)
 Count = Annotated[int, Parameter(help="How many.")]
@@ -61,7 +61,7 @@ def validate(
         draw(results, plots)
     if page:
         write_page(results, page, quick)
-    return 0 if passed else 1
+    return DONE if passed else FAILED
 
 
 @bench.command(name="simulate")
@@ -111,7 +111,7 @@ def bench_campaign(
         r["finite"] and r["strain"] <= 1.001e-4 and r["depth"] <= 1e-4 and r["astray"] == r["flipped"] == 0
         for r in runs
     )
-    return 0 if held else 1
+    return DONE if held else FAILED
 
 
 @bench.command(name="interpolate")
@@ -212,7 +212,7 @@ def bench_render_table(
     else:
         _table(found["rows"], tuple(found["rows"][0]))
         _report({name: found[name] for name in ("exponent", "equal")}, json)
-    return 0 if found["equal"] else 1
+    return DONE if found["equal"] else FAILED
 
 
 @app.command(group=CHECK_GROUP)
@@ -224,12 +224,12 @@ def doctor(*, outputs: Outputs = OUTPUTS, json: Json = False) -> int:
     passed = all(check.passed for check in checks)
     if json:
         print_json({"passed": passed, "checks": [asdict(check) for check in checks]})
-        return 0 if passed else 1
+        return DONE if passed else FAILED
     for check in checks:
         print(f"{'ok     ' if check.passed else 'MISSING'} {check.name:<16} {check.found}")
         if not check.passed:
             print(f"{'':<25}{check.remedy}")
-    return 0 if passed else 1
+    return DONE if passed else FAILED
 
 
 def _report(figures: dict[str, Any], json: bool) -> None:

@@ -6,10 +6,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pipeline.cli.base import CHECK_GROUP, Json, app, print_json
+from pipeline.errors import DONE, FAILED
 
 RESULTS = Path("outputs/images")
-
-Limit = Annotated[float | None, Parameter(show_default=False)]
 
 
 @app.command(group=CHECK_GROUP)
@@ -39,13 +38,13 @@ def compare(
             temporary.write_text(comparison_page(f"{reference} and {picture}", found.pairs), "utf-8")
     if json:
         print_json(found.as_json())
-        return 0 if found.passed else 1
+        return DONE if found.passed else FAILED
     for pair in found.pairs:
         figures = vars(pair.metrics).items() if pair.metrics else ()
         print(f"{pair.name:<16}", "  ".join(f"{name} {value:.5f}" for name, value in figures))
         for reason in pair.reasons:
             print(f"{'':<16} {reason}")
-    return 0 if found.passed else 1
+    return DONE if found.passed else FAILED
 
 
 @app.command(group=CHECK_GROUP)

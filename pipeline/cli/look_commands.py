@@ -17,7 +17,7 @@ from pipeline.cli.base import (
     load_config,
     print_json,
 )
-from pipeline.errors import InputError
+from pipeline.errors import DONE, FAILED, InputError
 
 Run = Annotated[Path, Parameter(help="The folder of a run, such as outputs/default, or its config.")]
 
@@ -114,7 +114,7 @@ def inspect(
         print_json(found)
     else:
         _print_contents(found)
-    return 0 if found["valid"] else 1
+    return DONE if found["valid"] else FAILED
 
 
 @app.command(group=LOOK_GROUP, sort_key=5)
@@ -156,7 +156,7 @@ def diff(
         print_json(found.as_json())
     else:
         print("\n".join(found.lines()))
-    return 0 if found.equal else 1
+    return DONE if found.equal else FAILED
 
 
 def _print_contents(found: dict[str, Any]) -> None:

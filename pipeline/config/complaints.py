@@ -2,6 +2,7 @@
 
 import difflib
 import json
+import re
 import types
 import typing
 from collections.abc import Iterator
@@ -76,11 +77,19 @@ def _written(loc: KeyPath, tree: Tree) -> KeyPath:
 
 
 def _sentence(detail: dict[str, Any]) -> str:
+    if detail["type"] == "string_pattern_mismatch":
+        return f"expected a name of {_letters(detail['ctx']['pattern'])}"
     message: str = detail["msg"]
     message = message.removeprefix("Value error, ").removesuffix(" or instance of Config")
     for pydantic, ours in _PHRASES.items():
         message = message.replace(pydantic, ours)
     return message
+
+
+def _letters(pattern: str) -> str:
+    """What a name may consist of, from the last class of characters of its pattern."""
+    others = re.findall(r"\[A-Za-z0-9(.*?)\]", pattern)[-1]
+    return f"letters, digits and {others}" + (", a letter first" if pattern.startswith("^[A-Za-z]") else "")
 
 
 def _shown(value: Any) -> str:
@@ -93,12 +102,18 @@ def _did_you_mean(key: KeyPath, tree: Tree) -> str:
     name, table = str(key[-1]), _model(key[:-1], tree)
     if table is not None and (close := difflib.get_close_matches(name, _names(table), 1)):
         return f"; did you mean {close[0]!r}?"
+    if table is not None and table in OPERATORS.values():
+        having = [operator for operator, model in OPERATORS.items() if name in _names(model)]
+        return f"; operators that have it: {', '.join(having)}" if having else _all_of(table)
     everywhere = _keys(Config, "")
     elsewhere = [other for other in everywhere if other.rpartition(".")[2] == name]
     if elsewhere:
         return f"; did you mean {elsewhere[0]!r}?"
-    listed = ", ".join(_names(table)) if table else ""
-    return f"; this table has {listed}" if listed else ""
+    return _all_of(table) if table else ""
+
+
+def _all_of(table: type[BaseModel]) -> str:
+    return f"; this table has {', '.join(_names(table))}"
 
 
 def _model(path: KeyPath, tree: Tree) -> type[BaseModel] | None:

@@ -201,7 +201,7 @@ def _syntax(path: Path, text: str, message: str) -> str:
 def _override(tree: Tree, override: str) -> None:
     key, equals, value = override.partition("=")
     if not equals or not key.strip():
-        raise InputError(f'-s {override}: expected key=value, such as -s "groom.style.waves.radius=9 mm"')
+        raise InputError(f'-s {override}: expected key=value, such as -s "simulate.hair.radius=45 um"')
     path = parse_key(key.strip())
     try:
         set_value(tree, path, _scalar(value.strip()), f"-s {dotted(path)}", Path.cwd())

@@ -37,7 +37,10 @@ class Tree:
         return value
 
     def where(self, path: KeyPath) -> str:
-        """Return the origin of a key, or of the innermost table around it that has one, or ""."""
+        """Return the origin of a key, else of something in it, else of the innermost table around it that has one, or ""."""
+        inside = (origin for key, origin in self.origins.items() if key[: len(path)] == path)
+        if path not in self.origins and (origin := next(inside, "")):
+            return origin
         for length in range(len(path), 0, -1):
             if path[:length] in self.origins:
                 return self.origins[path[:length]]

@@ -21,7 +21,6 @@ _PER_SECOND = {"1/s": 1.0, "Hz": 1.0, "fps": 1.0}
 _SPEEDS = {"m/s": 1.0, "cm/s": 1e-2}
 _ACCELERATIONS = {"m/s^2": 1.0}
 _FORCES = {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "µN": 1e-6}
-_CURVATURES = {"1/m": 1.0, "1/cm": 100.0}
 
 
 def parse_quantity(value: Any, units: dict[str, float]) -> float:
@@ -75,4 +74,3 @@ Rate = Annotated[float, _unit_validator(_PER_SECOND), _unit_schema(_PER_SECOND)]
 Speed = Annotated[float, _unit_validator(_SPEEDS), _unit_schema(_SPEEDS)]
 Acceleration = Annotated[float, _unit_validator(_ACCELERATIONS), _unit_schema(_ACCELERATIONS)]
 Force = Annotated[float, _unit_validator(_FORCES), _unit_schema(_FORCES)]
-Curvature = Annotated[float, _unit_validator(_CURVATURES), _unit_schema(_CURVATURES)]

@@ -11,7 +11,7 @@
 // its surface by a stiff spring rho n n^T, held points beyond the root by rho I; that couples all segments below the point; eliminated from tip to root as
 // a chain with the state (omega_j, dx_{j+1}) this still costs a fixed amount a segment (a Riccati recursion): the
 // matrix is positive definite iff all 3x3 pivots are.
-// test_second_variation_agrees_with_differences, test_upright_strand_buckles_at_greenhills_length prove it.
+// test_critical_factor_is_the_largest_eigenvalue_of_the_second_variation, test_upright_strand_buckles_at_greenhills_length prove it.
 #pragma once
 
 #include "statics.hpp"

@@ -28,12 +28,13 @@ for number in range(1_000_000):
 """
 
 WRITE_BEYOND_LIMIT = """
-import resource, sys
+import atexit, resource, sys
 from pathlib import Path
 import numpy as np
 from pipeline import cache
 from pipeline.errors import InputError
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
+atexit.register(resource.setrlimit, resource.RLIMIT_FSIZE, (-1, -1))  # coverage writes a file of its own
 try:
     with cache.create(Path(sys.argv[1]), kind="groom", key="new") as writer:
         writer.write("strands/points", np.random.default_rng(0).normal(size=(20_000, 16, 3)))

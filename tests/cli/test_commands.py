@@ -217,7 +217,8 @@ def test_a_full_disk_ends_a_run_with_one_message_and_nothing_lost(tmp_path: Path
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     subprocess.run([*fake, "groom", str(config), *outputs], check=True, env=environment, capture_output=True)
     limited = (
-        "import resource, runpy, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (4000, -1));"
+        "import atexit, resource, runpy, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (4000, -1));"
+        "atexit.register(resource.setrlimit, resource.RLIMIT_FSIZE, (-1, -1));"  # coverage writes a file of its own
         "sys.argv = sys.argv[1:]; runpy.run_path(sys.argv[0], run_name='__main__')"
     )
     command = [sys.executable, "-c", limited, fake[1], "run", str(config), *outputs]

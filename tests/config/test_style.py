@@ -99,7 +99,11 @@ def test_a_map_is_relative_to_its_config_and_counts_by_content(tmp_path: Path) -
         ('op = "curl"\nradus = 1', "x.toml:3: groom.style.a.radus: unknown key; did you mean 'radius'?"),
         (
             'op = "frizz"\npitch = 1',
-            "x.toml:3: groom.style.a.pitch: unknown key; did you mean 'groom.style.NAME.pitch'?",
+            "x.toml:3: groom.style.a.pitch: unknown key; operators that have it: curl",
+        ),
+        (
+            'op = "curl"\nmood = 1',
+            "x.toml:3: groom.style.a.mood: unknown key; this table has enabled, before",
         ),
         (
             'op = "curl"\nradius = -1',
