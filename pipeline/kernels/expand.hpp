@@ -182,7 +182,7 @@ class Skin {
 template <bool write = false, class T> RINGLET_INLINE void fetch(const T *from, size_t count) {
     constexpr size_t line = 64;
     const char *first = reinterpret_cast<const char *>(from);
-    for (size_t byte = 0; byte < count * sizeof(T); byte += line) __builtin_prefetch(first + byte, write, 2);
+    for (size_t byte = 0; byte < count * sizeof(T); byte += line) __builtin_prefetch(first + byte, write, 3);
 }
 
 /// What a thread needs for a block.
