@@ -178,6 +178,13 @@ class Skin {
     Lanes<float> at_root_, bound_; // phi at the root; a lower bound of phi at the current point
 };
 
+/// Asks for memory before it is read, or written: whoever then comes for it need not wait.
+template <bool write = false, class T> RINGLET_INLINE void fetch(const T *from, size_t count) {
+    constexpr size_t line = 64;
+    const char *first = reinterpret_cast<const char *>(from);
+    for (size_t byte = 0; byte < count * sizeof(T); byte += line) __builtin_prefetch(first + byte, write, 3);
+}
+
 /// What a thread needs for a block.
 struct ExpandScratch {
     Arena arena;
@@ -206,14 +213,16 @@ struct Expand {
 #pragma omp parallel num_threads(threads)
         {
             ExpandScratch scratch(P);
-#pragma omp for schedule(dynamic, 16)
+#pragma omp for schedule(dynamic, 32)
             for (int b = 0; b < blocks; ++b) {
                 const BlockIndex<float> index(b, count);
                 int strand[kLanes<float>], row[kLanes<float>];
                 for (int lane = 0; lane < kLanes<float>; ++lane) {
                     strand[lane] = taken[index.strand[lane]];
                     row[lane] = strand[lane] - begin;
+                    fetch<true>(out + size_t(row[lane]) * 3 * P, 3 * P);
                 }
+                fetch_ahead(taken, (b + 1) * kLanes<float>);
                 block(strand, scratch);
                 scatter<float>(&scratch.x->x, out, 3 * P, row, index.count);
             }
@@ -221,6 +230,21 @@ struct Expand {
     }
 
   private:
+    /// Asks for what the strands taken from `first` on are made of: they lie all over the memory of their tile, and those
+    /// of the block after them are asked for their parents.
+    void fetch_ahead(const std::vector<int> &taken, size_t first) const {
+        constexpr size_t n = kLanes<float>;
+        for (size_t i = first; i < std::min(first + n, taken.size()); ++i)
+            fetch(rest + size_t(strands.parent[taken[i]]) * 3 * P, 3 * P);
+        for (size_t i = first + n; i < std::min(first + 2 * n, taken.size()); ++i) {
+            const size_t s = size_t(taken[i]), k = size_t(strands.k);
+            fetch(strands.parent + s, 1), fetch(strands.root + 3 * s, 3), fetch(strands.key + s, 1);
+            fetch(strands.guide + s * k, k), fetch(strands.weight + s * k, k);
+            fetch(strands.scale + s, 1), fetch(strands.phase + s, 1);
+            if (place) fetch(place + 3 * s, 3);
+        }
+    }
+
     /// Points of a block of strands to scratch.x.
     void block(const int (&strand)[kLanes<float>], const ExpandScratch &scratch) const {
         Vec3<float> *x = scratch.x, *e = scratch.e, root;
