@@ -600,14 +600,12 @@ def expand(
 _F32 = NDArray[np.float32]
 
 class DensityGrid:
-    """Drawn hair in voxels: one integer count for each direction and one without.
+    """Drawn hair in voxels, as integer counts.
 
     Integers add in any order, so that the sums depend neither on threads nor on how strands are cut into chunks.
     """
 
-    def __init__(
-        self, shape: tuple[int, int, int], origin: _F64, spacing: float, width: float, directions: _F32
-    ) -> None:
+    def __init__(self, shape: tuple[int, int, int], origin: _F64, spacing: float, width: float) -> None:
         """An empty grid.
 
         Args:
@@ -615,7 +613,6 @@ class DensityGrid:
             origin: (3,) float64 [m], outer corner of the first voxel.
             spacing: [m], side of a voxel.
             width: [m], a typical drawn width; the counts are multiples of spacing * width / 4096.
-            directions: (L, 3) float32 unit vectors.
 
         """
 
@@ -623,11 +620,7 @@ class DensityGrid:
         """Adds strands: points (S, P, 3) float32 [m], widths (S, P) float32 [m]. Parts outside the grid are left out."""
 
     def density(self) -> _F32:
-        """(L+1, nx, ny, nz) float32 [1/m]: projected width per volume; blurred by a Gaussian of 0.7 voxels.
-
-        Entry l < L counts length * width * |t x L_l|, the last one length * width. A line integral of entry l
-        towards its light is the mean number of fibres on the way.
-        """
+        """(nx, ny, nz) float32 [1/m]: length * width per volume; blurred by a Gaussian of 0.7 voxels."""
 
     shape: tuple[int, int, int]
     origin: tuple[float, float, float]
@@ -700,12 +693,12 @@ class Shadows:
         """Keeps strands until `finish`: points (S, P, 3) float32 [m], widths (S, P) float32 [m]; P is always the same."""
 
     def finish(
-        self, depth: _F32, origin: _F64, spacing: float, field: DistanceField | None, pose: _F64
+        self, hair: _F32, origin: _F64, spacing: float, field: DistanceField | None, pose: _F64
     ) -> None:
         """Makes the maps.
 
         Args:
-            depth: (L, nx, ny, nz) float32, strands towards each light on the density grid: deep in the hair less care is taken.
+            hair: (nx, ny, nz) float32 [1/m], strands on the density grid: deep in the hair less care is taken.
             origin: (3,) float64 [m], outer corner of its first voxel.
             spacing: [m], of its voxels.
             field: the head in its rest frame.
@@ -718,7 +711,7 @@ class Shadows:
 
         Returns:
             (nu, nv, 2): distance [m] of the first strand from the map's beginning, and strands there are in all;
-            (nu, nv, 32): strands up to each layer; (nu, nv): distance [m] of the head.
+            (nu, nv, 32) uint16: 32 times the strands up to each layer, as binary16; (nu, nv): distance [m] of the head.
 
         """
 

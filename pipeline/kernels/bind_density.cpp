@@ -24,16 +24,12 @@ static void check_directions(const Vectors &directions, const char *message) {
     }
 }
 
-static void make_grid(DensityGrid *grid, std::array<int, 3> shape, Doubles3 origin, double spacing, double width,
-                      Vectors directions) {
+static void make_grid(DensityGrid *grid, std::array<int, 3> shape, Doubles3 origin, double spacing, double width) {
     for (int extent : shape) require(extent >= 4 && extent <= 1024, "DensityGrid: expected 4 .. 1024 voxels along each axis");
     require(spacing > 0 && std::isfinite(spacing), "DensityGrid: expected a positive spacing");
     require(width > 0 && std::isfinite(width), "DensityGrid: expected a positive width");
-    check_directions(directions, "DensityGrid: expected unit directions");
     const double *o = origin.data();
-    new (grid) DensityGrid{shape, {o[0], o[1], o[2]}, spacing, spacing * width / 4096, int(directions.shape(0)), {}, {}};
-    grid->directions.resize(grid->groups());
-    for (size_t i = 0; i < directions.size(); ++i) grid->directions[i / 12][i % 3][i / 3 % 4] = directions.data()[i];
+    new (grid) DensityGrid{shape, {o[0], o[1], o[2]}, spacing, spacing * width / 4096, {}};
 }
 
 static void add(DensityGrid &grid, Array<const float, -1, -1, 3> points, Array<const float, -1, -1> widths) {
@@ -46,7 +42,7 @@ static void add(DensityGrid &grid, Array<const float, -1, -1, 3> points, Array<c
 #pragma omp parallel for schedule(static, 1) num_threads(count)
     for (int thread = 0; thread < count; ++thread) {
         auto &counts = grid.counts[thread];
-        counts.resize(4 * grid.voxels() * grid.groups());
+        counts.resize(grid.voxels());
         for (size_t s = S * thread / count; s < S * (thread + 1) / count; ++s)
             add_strand(grid, counts.data(), points.data() + s * P * 3, widths.data() + s * P, int(P));
     }
@@ -54,13 +50,11 @@ static void add(DensityGrid &grid, Array<const float, -1, -1, 3> points, Array<c
 
 static nb::ndarray<nb::numpy, float> density(const DensityGrid &grid) {
     const auto n = grid.shape;
-    auto values = new_array<float>({size_t(grid.channels()), size_t(n[0]), size_t(n[1]), size_t(n[2])});
+    auto values = new_array<float>({size_t(n[0]), size_t(n[1]), size_t(n[2])});
     float *data = values.data();
     nb::gil_scoped_release release;
-    for (int channel = 0; channel < grid.channels(); ++channel) {
-        read_channel(grid, channel, data + channel * grid.voxels(), threads());
-        blur(data + channel * grid.voxels(), n.data(), threads());
-    }
+    read_density(grid, data, threads());
+    blur(data, n.data(), threads());
     return values;
 }
 
@@ -114,8 +108,7 @@ static nb::ndarray<nb::numpy, float> surroundings(Volume hair, Volume body, doub
 
 void bind_density(nb::module_ &m) {
     nb::class_<DensityGrid>(m, "DensityGrid")
-        .def("__init__", &make_grid, nb::arg("shape"), nb::arg("origin"), nb::arg("spacing"), nb::arg("width"),
-             nb::arg("directions"))
+        .def("__init__", &make_grid, nb::arg("shape"), nb::arg("origin"), nb::arg("spacing"), nb::arg("width"))
         .def("add", &add, nb::arg("points"), nb::arg("widths"))
         .def("density", &density)
         .def_ro("shape", &DensityGrid::shape)

@@ -36,28 +36,22 @@ static void add(Shadows &shadows, Array<const float, -1, -1, 3> points, Array<co
     shadows.add(points.data(), widths.data(), S, int(P));
 }
 
-static void finish(Shadows &shadows, Array<const float, -1, -1, -1, -1> depth, Doubles origin, double spacing,
-                   const DistanceField *field, Array<const double, 4, 4> pose) {
-    require(depth.shape(0) == shadows.maps.size(), "Shadows.finish: depth does not fit the lights");
+static void finish(Shadows &shadows, Array<const float, -1, -1, -1> hair, Doubles origin, double spacing, const DistanceField *field,
+                   Array<const double, 4, 4> pose) {
     require(spacing > 0, "Shadows.finish: expected a positive spacing");
+    if (shadows.maps.empty()) return;
+    const int n[3] = {int(hair.shape(0)), int(hair.shape(1)), int(hair.shape(2))};
     const Pose to_world = Pose::of(pose.data());
-    std::vector<Depths> depths;
-    for (size_t l = 0; l < shadows.maps.size(); ++l) {
-        Depths voxels{depth.data() + l * depth.shape(1) * depth.shape(2) * depth.shape(3), {}, {}, float(1 / spacing)};
-        for (int k = 0; k < 3; ++k) {
-            voxels.n[k] = int(depth.shape(k + 1));
-            voxels.origin[k] = float(origin.data()[k] + 0.5 * spacing - shadows.maps[l].centre[k]);
-        }
-        depths.push_back(voxels);
-    }
     nb::gil_scoped_release release;
-    shadows.finish(depths, field, to_world, threads());
+    HairVoxels voxels{halve(hair.data(), n), {}, {}, float(2 * spacing)};
+    for (int k = 0; k < 3; ++k) voxels.n[k] = n[k] / 2, voxels.origin[k] = float(origin.data()[k] - shadows.maps[0].centre[k]);
+    shadows.finish(voxels, field, to_world, threads());
 }
 
 static nb::ndarray<nb::numpy, float> reached(const Shadows &shadows, int light, Array<const float, -1, 3> points, float own) {
     require(light >= 0 && light < int(shadows.maps.size()), "Shadows.reach: no such light");
     const ShadowMap &map = shadows.maps[light];
-    require(!map.layers.empty(), "Shadows.reach: finish the shadows first");
+    require(map.layers.bits != nullptr, "Shadows.reach: finish the shadows first");
     const size_t N = points.shape(0);
     auto result = new_array<float>({N, size_t(3)});
     float *out = result.data();
@@ -76,11 +70,11 @@ static nb::tuple map_of(nb::handle self, int light) {
     Shadows &shadows = nb::cast<Shadows &>(self);
     require(light >= 0 && light < int(shadows.maps.size()), "Shadows.map: no such light");
     ShadowMap &map = shadows.maps[light];
-    require(!map.layers.empty(), "Shadows.map: finish the shadows first");
+    require(map.layers.bits != nullptr, "Shadows.map: finish the shadows first");
     const size_t nu = map.n[0], nv = map.n[1];
     using View = nb::ndarray<nb::numpy, float>;
-    return nb::make_tuple(View(map.surface.data(), {nu, nv, size_t(2)}, self), View(map.layers.data(), {nu, nv, size_t(ShadowMap::kLayers)}, self),
-                          View(map.solid.data(), {nu, nv}, self));
+    nb::ndarray<nb::numpy, uint16_t> layers(map.layers.bits.get(), {nu, nv, size_t(ShadowMap::kLayers)}, self);
+    return nb::make_tuple(View(map.surface.data(), {nu, nv, size_t(2)}, self), layers, View(map.solid.data(), {nu, nv}, self));
 }
 
 void bind_shadow(nb::module_ &m) {
@@ -88,7 +82,7 @@ void bind_shadow(nb::module_ &m) {
         .def("__init__", &make_shadows, nb::arg("directions"), nb::arg("lower"), nb::arg("upper"), nb::arg("spacing"), nb::arg("width"),
              nb::arg("share") = 1.0)
         .def("add", &add, nb::arg("points"), nb::arg("widths"))
-        .def("finish", &finish, nb::arg("depth"), nb::arg("origin"), nb::arg("spacing"), nb::arg("field").none(), nb::arg("pose"))
+        .def("finish", &finish, nb::arg("hair"), nb::arg("origin"), nb::arg("spacing"), nb::arg("field").none(), nb::arg("pose"))
         .def("map", &map_of, nb::arg("light"))
         .def("reach", &reached, nb::arg("light"), nb::arg("points"), nb::arg("own") = 0.0f);
 }

@@ -1,8 +1,6 @@
 // Drawn hair in voxels, as integers: sums depend neither on threads nor on the order of strands.
 //
-// A sub-segment no longer than a voxel adds length * width * |t x L| for each light L, and length * width without
-// direction, trilinearly to 8 voxels. Four of these channels lie side by side, so that two voxels that follow each
-// other along z take them in one addition.
+// A sub-segment no longer than a voxel adds length * width trilinearly to 8 voxels.
 #pragma once
 
 #include "simd.hpp"
@@ -16,60 +14,40 @@
 
 namespace ringlet {
 
-typedef float Four __attribute__((vector_size(16)));
 typedef float Eight __attribute__((vector_size(32)));
-typedef int32_t EightInts __attribute__((vector_size(32)));
-typedef uint32_t EightWords __attribute__((vector_size(32)));
 
 struct DensityGrid {
     std::array<int, 3> shape;
     std::array<double, 3> origin; // outer corner of the first voxel [m]
     double spacing;               // [m]
     double quantum;               // what one count stands for [m^2]
-    int lights;
-    std::vector<std::array<Four, 3>> directions; // for each group of four channels; 0: without direction
-    std::vector<std::vector<uint32_t>> counts; // for each thread (channels / 4, nx, ny, nz, 4)
+    std::vector<std::vector<uint32_t>> counts; // (nx, ny, nz) for each thread
 
     size_t voxels() const { return size_t(shape[0]) * shape[1] * shape[2]; }
-    int channels() const { return lights + 1; }
-    int groups() const { return (channels() + 3) / 4; }
 };
 
-/// |t x L| for four channels; 1 for a channel without direction.
-RINGLET_INLINE Four projected(const std::array<Four, 3> &L, const float t[3]) {
-    const Four cosine = t[0] * L[0] + t[1] * L[1] + t[2] * L[2], square = 1 - cosine * cosine;
-    Four sine;
-    for (int k = 0; k < 4; ++k) sine[k] = std::sqrt(square[k] > 0 ? square[k] : 0);
-    return sine;
-}
-
 /// Adds `area` to the 8 voxels around g, given in voxels from the first voxel's middle.
-RINGLET_INLINE void add_around(const DensityGrid &grid, uint32_t *counts, const float g[3], Four area) {
+RINGLET_INLINE void add_around(const DensityGrid &grid, uint32_t *counts, const float g[3], float area) {
     // Truncation is floor here: g >= 0 is checked on the float, so that huge values cannot wrap
     if (!(g[0] >= 0 && g[1] >= 0 && g[2] >= 0 && g[0] < grid.shape[0] - 1 && g[1] < grid.shape[1] - 1 &&
           g[2] < grid.shape[2] - 1))
         return;
     const int x = int(g[0]), y = int(g[1]), z = int(g[2]);
     const float u = g[0] - x, v = g[1] - y, w = g[2] - z;
-    const Four low = area * (1 - w), high = area * w;
-    const Eight pair = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
-    const size_t row = 4 * size_t(grid.shape[2]), slab = row * grid.shape[1];
-    uint32_t *at = counts + x * slab + y * row + 4 * size_t(z);
+    const float low = area * (1 - w), high = area * w;
+    const size_t row = grid.shape[2], slab = row * grid.shape[1];
+    uint32_t *at = counts + x * slab + y * row + z;
     const float weight[4] = {(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v};
     const size_t offset[4] = {0, row, slab, slab + row};
     for (int corner = 0; corner < 4; ++corner) {
-        const EightInts share = __builtin_convertvector(pair * weight[corner] + 0.5f, EightInts);
-        EightWords sum;
-        __builtin_memcpy(&sum, at + offset[corner], sizeof sum);
-        sum += (EightWords)share;
-        __builtin_memcpy(at + offset[corner], &sum, sizeof sum);
+        at[offset[corner]] += uint32_t(low * weight[corner] + 0.5f);
+        at[offset[corner] + 1] += uint32_t(high * weight[corner] + 0.5f);
     }
 }
 
 /// One strand of P points and widths.
 inline void add_strand(const DensityGrid &grid, uint32_t *counts, const float *points, const float *widths, int P) {
     const float inverse = float(1 / grid.spacing);
-    const size_t group_size = 4 * grid.voxels();
     for (int j = 0; j + 1 < P; ++j) {
         const float *a = points + 3 * j, *b = a + 3;
         float e[3], g[3], length = 0;
@@ -82,14 +60,10 @@ inline void add_strand(const DensityGrid &grid, uint32_t *counts, const float *p
         if (!(length > 0 && length < 1e3f)) continue; // a strand that broke casts no shadow
         const int steps = std::min(int(length * inverse) + 1, 4096);
         const float area = length / steps * 0.5f * (widths[j] + widths[j + 1]) / float(grid.quantum);
-        const float t[3] = {e[0] / length, e[1] / length, e[2] / length};
-        for (int group = 0; group < grid.groups(); ++group) {
-            const Four share = area * projected(grid.directions[group], t);
-            for (int s = 0; s < steps; ++s) {
-                const float f = (s + 0.5f) / steps * inverse;
-                const float at[3] = {g[0] + f * e[0], g[1] + f * e[1], g[2] + f * e[2]};
-                add_around(grid, counts + group * group_size, at, share);
-            }
+        for (int s = 0; s < steps; ++s) {
+            const float f = (s + 0.5f) / steps * inverse;
+            const float at[3] = {g[0] + f * e[0], g[1] + f * e[1], g[2] + f * e[2]};
+            add_around(grid, counts, at, area);
         }
     }
 }
@@ -125,15 +99,15 @@ inline void blur(float *values, const int n[3], int threads) {
     }
 }
 
-/// The grid's channel as density [1/m] into (nx, ny, nz), not yet blurred.
-inline void read_channel(const DensityGrid &grid, int channel, float *density, int threads) {
-    const size_t voxels = grid.voxels(), offset = size_t(channel / 4) * 4 * voxels + channel % 4;
+/// The density [1/m] into (nx, ny, nz), not yet blurred.
+inline void read_density(const DensityGrid &grid, float *density, int threads) {
+    const size_t voxels = grid.voxels();
     const float unit = float(grid.quantum / (grid.spacing * grid.spacing * grid.spacing));
 #pragma omp parallel for schedule(static) num_threads(threads)
     for (size_t i = 0; i < voxels; ++i) {
         uint32_t sum = 0;
         for (const auto &counts : grid.counts)
-            if (!counts.empty()) sum += counts[offset + 4 * i];
+            if (!counts.empty()) sum += counts[i];
         density[i] = float(sum) * unit;
     }
 }

@@ -1,7 +1,7 @@
 // The shadow maps of all lights, from strands that are added in any chunks.
 #pragma once
 
-#include "shadow_map.hpp"
+#include "shadow_fill.hpp"
 
 namespace ringlet {
 
@@ -45,6 +45,9 @@ struct Shadows {
     std::vector<ShadowMap> maps;
     Casters casters;
 
+    Shadows() = default;
+    Shadows(Shadows &&) = default;
+
     /// Takes in strands (S, P).
     void add(const float *points, const float *widths, size_t S, int P) {
         if (maps.empty()) return;
@@ -56,12 +59,9 @@ struct Shadows {
     }
 
     /// Makes the maps of all that was added and of the head.
-    void finish(const std::vector<Depths> &depths, const DistanceField *field, const Pose &pose, int threads) {
-        std::vector<uint32_t> counts;
-        for (size_t l = 0; l < maps.size(); ++l) {
-            ShadowMap &map = maps[l];
-            find_front(map, casters, depths[l], threads);
-            fill_layers(map, casters, depths[l], counts, threads);
+    void finish(const HairVoxels &voxels, const DistanceField *field, const Pose &pose, int threads) {
+        for (ShadowMap &map : maps) {
+            ShadowFill(map, casters, threads)(voxels);
             find_solid(map, field, pose, threads);
         }
         casters = {};

@@ -28,7 +28,6 @@ _FINER: Final = 3
 _CASTERS: Final = 200_000
 """Points of strands from which on not all cast shadows: of c times as many one in c^0.7."""
 _CASTER: Final = 41  # salt
-_NO_LIGHT: Final = np.zeros((0, 3), np.float32)
 _SKY_DIRECTIONS: Final = 26
 _OPAQUE: Final = 4
 """Times that the head is denser for the eye than for light: two voxels of it hide everything."""
@@ -86,7 +85,7 @@ class Lighting:
         shape = 2 * np.ceil((size / spacing + 2 * _MARGIN) / 2).astype(int)
         origin = np.asarray(lower, np.float64) - (shape * spacing - size) / 2
         nx, ny, nz = (int(extent) for extent in shape)
-        self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width, _NO_LIGHT)
+        self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width)
         low = np.asarray(lower, np.float64)
         self._every = max(math.ceil((points / _CASTERS) ** 0.7), 1)
         self._shadows = kernels.Shadows(
@@ -119,9 +118,8 @@ class Lighting:
         else:
             body = kernels.body_density(head, pose, grid.shape, origin, grid.spacing)
         # A fibre seen from all sides shows pi / 4 of its length * width
-        hair = density[-1] * np.float32(np.pi / 4)
-        depth = kernels.optical_depth(hair[None], grid.spacing, self._directions)
-        self._shadows.finish(depth, origin, grid.spacing, head, pose)
+        hair = density * np.float32(np.pi / 4)
+        self._shadows.finish(hair, origin, grid.spacing, head, pose)
         sky = kernels.surroundings(
             hair,
             body,

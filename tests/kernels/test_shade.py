@@ -31,12 +31,12 @@ class Room:
         """These depths for lights in these directions (L, 3)."""
         corner, n = np.ones(3), 4
         shadows = kernels.Shadows(directions.astype(np.float32), -corner, corner, 0.5, 1e-9)
-        shadows.finish(np.zeros((len(directions), 1, 1, 1), np.float32), corner, 1.0, None, np.eye(4))
+        shadows.finish(np.zeros((1, 1, 1), np.float32), corner, 1.0, None, np.eye(4))
         for index in range(len(directions)):
             surface, layers, solid = shadows.map(index)
             # Far behind the first strand no ray to the eye shares strands with the one to the light
             surface[..., 0], surface[..., 1] = -1e6, self.n + self.behind
-            layers[...], solid[...] = self.n, -1e9 if self.dark else 1e9
+            layers[...], solid[...] = np.float16(32 * self.n).view(np.uint16), -1e9 if self.dark else 1e9
         around = np.zeros((n // 2, n // 2, n // 2, 8), np.float32)
         around[..., :3], around[..., 4:7] = 1, self.normal
         light = kernels.Illumination(

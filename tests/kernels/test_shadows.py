@@ -27,7 +27,7 @@ def shadows(points: _F32, widths: _F32, chunk: int = 10**9, share: float = 1.0) 
     maps = kernels.Shadows(LIGHTS, LOW, HIGH, SPACING, WIDTH, share)
     for first in range(0, len(points), chunk):
         maps.add(points[first : first + chunk], widths[first : first + chunk])
-    maps.finish(np.zeros((3, 4, 4, 4), np.float32), LOW, 0.02, None, np.eye(4))
+    maps.finish(np.zeros((4, 4, 4), np.float32), LOW, 0.02, None, np.eye(4))
     return maps
 
 
@@ -104,7 +104,7 @@ def test_the_heads_shadow_has_its_edge_where_it_should() -> None:
         (np.linalg.norm(grid, axis=-1) - 0.01).astype(np.float32), np.full(3, -(n // 2) * h), h
     )
     maps = kernels.Shadows(LIGHTS, LOW, HIGH, SPACING, WIDTH)
-    maps.finish(np.zeros((3, 1, 1, 1), np.float32), LOW, 1.0, ball, np.eye(4))
+    maps.finish(np.zeros((1, 1, 1), np.float32), LOW, 1.0, ball, np.eye(4))
     radii = np.linspace(0.005, 0.015, 201)
     turn = np.linspace(0, 2 * np.pi, 40)[:, None]
     x = np.stack([radii * np.cos(turn), np.full((40, 201), -0.018), radii * np.sin(turn)], -1)
