@@ -262,7 +262,7 @@ class FrameRenderer:
             return
         widths = self._own_widths(points)
         if shape == "tubes":
-            self.target.tubes(points, colours, widths, self.render.tube_sides)
+            self.target.tubes(points, colours, widths, segments, self.render.tube_sides)
             return
         edges, triangles = ribbons(points, widths, eye, segments)
         self.target.triangles(edges.reshape(-1, 3), triangles, np.repeat(colours.reshape(-1, 3), 2, axis=0))

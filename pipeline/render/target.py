@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline import kernels
 from pipeline.errors import InputError
 from pipeline.render.view import View
 
@@ -75,44 +76,27 @@ class Target:
 
     def triangles(self, points: Points, triangles: NDArray[np.integer[Any]], colours: Colours) -> None:
         """Draw triangles (T, 3) over points (N, 3) [m] with linear colours (N, 3)."""
-        mesh = self._poly_data(points, colours)
-        mesh.SetPolys(self._cells(np.arange(0, 3 * len(triangles) + 1, 3), triangles.reshape(-1)))
-        self._draw(mesh)
+        self._draw(self._mesh(points, triangles, encode(colours)))
 
     def lines(self, points: Points, colours: Colours, drawn: NDArray[np.bool_]) -> None:
         """Draw segments (S, P-1) of strands (S, P, 3) [m] as lines one sample wide."""
-        mesh = self._poly_data(points.reshape(-1, 3), colours.reshape(-1, 3))
+        mesh = self._poly_data(points.reshape(-1, 3), encode(colours.reshape(-1, 3)))
         strand, segment = np.nonzero(drawn)
         first = strand * points.shape[1] + segment
         ends = np.stack([first, first + 1], axis=1).reshape(-1)
         mesh.SetLines(self._cells(np.arange(0, len(ends) + 1, 2), ends))
         self._draw(mesh)
 
-    def tubes(self, points: Points, colours: Colours, widths: NDArray[np.float32], sides: int) -> None:
-        """Draw strands (S, P, 3) [m] as tubes of widths (S, P) [m] by VTK's tube filter."""
+    def tubes(
+        self, points: Points, colours: Colours, widths: NDArray[np.float32], drawn: NDArray[np.bool_], sides: int
+    ) -> None:
+        """Draw segments (S, P-1) of strands (S, P, 3) [m] as closed tubes of widths (S, P) [m], what faces the eye."""
+        eye = np.array(self._renderer.GetActiveCamera().GetPosition())
         for first in range(0, len(points), _TUBES):
             part = slice(first, first + _TUBES)
-            self._draw(self._tubes(points[part], colours[part], widths[part], sides))
-
-    def _tubes(self, points: Points, colours: Colours, widths: NDArray[np.float32], sides: int) -> Any:
-        from vtkmodules.util.numpy_support import numpy_to_vtk
-
-        strands, count, _ = points.shape
-        mesh = self._poly_data(points.reshape(-1, 3), colours.reshape(-1, 3))
-        mesh.SetLines(self._cells(np.arange(0, strands * count + 1, count), np.arange(strands * count)))
-        radius = numpy_to_vtk(np.ascontiguousarray(widths.reshape(-1) / 2, np.float64), deep=True)
-        radius.SetName("radius")
-        mesh.GetPointData().AddArray(radius)
-        mesh.GetPointData().SetActiveScalars("radius")
-        tube = self._vtk.vtkTubeFilter()
-        tube.SetInputData(mesh)
-        tube.SetNumberOfSides(sides)
-        tube.SetVaryRadiusToVaryRadiusByAbsoluteScalar()
-        tube.CappingOn()
-        tube.Update()
-        drawn = tube.GetOutput()
-        drawn.GetPointData().SetActiveScalars("colour")
-        return drawn
+            corners, triangles = kernels.tubes(points[part], widths[part], drawn[part], sides, eye)
+            own = np.repeat(encode(colours[part]).reshape(-1, 3), sides, axis=0)
+            self._draw(self._mesh(corners.reshape(-1, 3), triangles, own))
 
     def read(self) -> NDArray[np.uint8]:
         """The bytes of the framebuffer (H, W, 3), top row first."""
@@ -162,11 +146,21 @@ class Target:
         self._renderer.PreserveDepthBufferOn()
         self._kept.clear()
 
-    def _poly_data(self, points: Points, colours: Colours) -> Any:
+    def _mesh(self, points: Points, triangles: NDArray[np.integer[Any]], encoded: NDArray[np.uint8]) -> Any:
+        from vtkmodules.util.numpy_support import numpy_to_vtk
+
+        mesh = self._poly_data(points, encoded)
+        corners = np.ascontiguousarray(triangles, np.int32).reshape(-1)
+        self._kept.append(corners)
+        cells = self._vtk.vtkCellArray()
+        cells.SetData(3, numpy_to_vtk(corners))
+        mesh.SetPolys(cells)
+        return mesh
+
+    def _poly_data(self, points: Points, encoded: NDArray[np.uint8]) -> Any:
         from vtkmodules.util.numpy_support import numpy_to_vtk
 
         positions = np.ascontiguousarray(points, np.float32)
-        encoded = encode(colours)
         self._kept += [positions, encoded]  # VTK does not copy them
         vertices = self._vtk.vtkPoints()
         vertices.SetData(numpy_to_vtk(positions))
