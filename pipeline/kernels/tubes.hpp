@@ -2,7 +2,9 @@
 //
 // The tubes are those of VTK's tube filter: a polygon of K corners around each point, across the mean direction of both
 // segments, which turns from point to point by no more than the strand does (its frame slides along). A tube is closed,
-// so that an eye outside sees only the sides that face it: those behind them are left out, half of all triangles.
+// so that an eye outside sees only the sides that face it: those behind them are left out, half of all triangles. Of a
+// tube narrower than a sample of the picture no more is seen than its outline, one pair of triangles a segment; that
+// covers the same samples, at most a radius farther away.
 //
 // Notation: x points, t unit direction of a segment, c their unit mean at a point, n the frame's normal, q unit axis
 // about which a strand turns at a point, r radius, K corners.
@@ -22,6 +24,11 @@ struct TubeStrands {
     int S, P;
 };
 
+struct TubeView {
+    const double *eye; // (3,) [m]
+    double fine;       // [rad] a tube that is narrower as seen from the eye is drawn as its outline
+};
+
 using Triangles = std::vector<int32_t>;
 
 class Tubes {
@@ -33,8 +40,8 @@ class Tubes {
     static constexpr int kStrands = kLanes<double>;
     static constexpr int kMostSides = 32;
 
-    Tubes(const TubeStrands &strands, int sides, const double *eye)
-        : strands_(strands), K_(sides), eye_(broadcast<double>(eye)) {
+    Tubes(const TubeStrands &strands, int sides, const TubeView &view)
+        : strands_(strands), K_(sides), eye_(broadcast<double>(view.eye)), fine_(view.fine) {
         for (int k = 0; k < K_; ++k) {
             cosine_[k] = std::cos(2 * M_PI * k / K_);
             sine_[k] = std::sin(2 * M_PI * k / K_);
@@ -64,8 +71,10 @@ class Tubes {
     const TubeStrands strands_;
     const int K_;
     const Point eye_;
+    const Real fine_;
     Real cosine_[kMostSides], sine_[kMostSides];
 
+    int next(int k) const { return k + 1 < K_ ? k + 1 : 0; }
     int strand(int first, int lane) const { return std::min(first + lane, strands_.S - 1); }
 
     Point point(int first, int j) const {
@@ -160,15 +169,47 @@ class Tubes {
         }
     }
 
-    /// The sides of segment j that face the eye.
+    /// The sides of segment j that face the eye, or the outline of a fine one.
     void sides(int first, int j, const Point *a, const Point *b, Triangles *triangles) const {
-        const uint32_t lanes = drawn(first, j);
+        uint32_t lanes = drawn(first, j);
         if (!lanes) return;
-        for (int k = 0; k < K_; ++k) {
-            const int l = k + 1 < K_ ? k + 1 : 0;
+        lanes = outlines(first, j, lanes, a, b, triangles);
+        for (int k = 0; lanes && k < K_; ++k) {
+            const int l = next(k);
             add(first, j, lanes & facing(a[k], b[k], a[l]), k, K_ + k, l, triangles);
             add(first, j, lanes & facing(a[l], b[k], b[l]), l, K_ + k, K_ + l, triangles);
         }
+    }
+
+    /// Adds the outline of segment j to those lanes where it is fine and has one, and gives the other lanes.
+    uint32_t outlines(int first, int j, uint32_t lanes, const Point *a, const Point *b, Triangles *triangles) const {
+        uint32_t fine = lanes & this->fine(first, j, a[0], b[0]);
+        if (!fine) return lanes;
+        uint32_t sides[kStrands] = {};
+        for (int k = 0; k < K_; ++k) {
+            const Point across = cross(b[next(k)] - a[k], a[next(k)] - b[k]); // of both triangles
+            const uint32_t faces = set_lanes<Real>(dot(across, eye_ - a[k]) > 0.0);
+            for (int lane = 0; lane < kStrands; ++lane) sides[lane] |= (faces >> lane & 1) << k;
+        }
+        for (; fine; fine &= fine - 1) {
+            const int lane = __builtin_ctz(fine);
+            const uint32_t facing = sides[lane], begins = facing & ~(facing << 1 | facing >> (K_ - 1));
+            if (__builtin_popcount(begins) != 1) continue; // seen along itself
+            const int from = __builtin_ctz(begins), to = (from + __builtin_popcount(facing)) % K_;
+            add(first, j, 1u << lane, from, K_ + from, to, triangles);
+            add(first, j, 1u << lane, to, K_ + from, K_ + to, triangles);
+            lanes &= ~(1u << lane);
+        }
+        return lanes;
+    }
+
+    /// Lanes whose segment j is narrower than what a sample of the picture shows.
+    uint32_t fine(int first, int j, const Point &a, const Point &b) const {
+        const auto narrow = [&](int at, const Point &corner) {
+            const Point way = eye_ - corner;
+            return 2 * radius(first, at) < fine_ * square_root<Real>(dot(way, way));
+        };
+        return set_lanes<Real>(narrow(j, a) & narrow(j + 1, b));
     }
 
     /// The end of a strand, seen against its direction (-1) or along it (1), where its segment is drawn.
@@ -182,8 +223,8 @@ class Tubes {
 };
 
 /// Corners (S, P, K, 3) of all strands, and their triangles, three corners each, strand by strand.
-inline Triangles make_tubes(const TubeStrands &strands, int sides, const double *eye, float *corners, int threads) {
-    const Tubes tubes(strands, sides, eye);
+inline Triangles make_tubes(const TubeStrands &strands, int sides, const TubeView &view, float *corners, int threads) {
+    const Tubes tubes(strands, sides, view);
     const int blocks = (strands.S + Tubes::kStrands - 1) / Tubes::kStrands;
     std::vector<Triangles> own(size_t(blocks) * Tubes::kStrands);
 #pragma omp parallel for schedule(dynamic, 16) num_threads(threads)

@@ -69,7 +69,9 @@ def whole_tube(points: int, sides: int) -> NDArray[np.int64]:
     return np.concatenate(sheets + lids)
 
 
-def nearest(eye: NDArray[np.float64], rays: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def nearest(
+    eye: NDArray[np.float64], rays: NDArray[np.float64], corners: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Distance (N,) along rays (N, 3) to the first of triangles (T, 3, 3); endless where there is none.
 
     Moeller and Trumbore, Fast, minimum storage ray-triangle intersection, 1997.
@@ -103,6 +105,32 @@ def test_rays_meet_the_triangles_that_face_the_eye_where_they_meet_the_whole_tub
     assert 300 < hit.sum() < 1400
     assert np.array_equal(hit, np.isfinite(found))
     assert np.abs(found[hit] - wanted[hit]).max() < 1e-9
+
+
+def test_the_outline_of_a_fine_tube_covers_what_the_tube_covers() -> None:
+    """At most a radius farther away, with a pair of triangles a segment; what is wider keeps its sides."""
+    points, widths = curls(1, points=60)
+    widths *= 0.2
+    corners, front = kernels.tubes(points, widths, all_drawn(points), 4, EYE)
+    _, outline = kernels.tubes(points, widths, all_drawn(points), 4, EYE, 1e-3)
+    _, kept = kernels.tubes(points, widths, all_drawn(points), 4, EYE, 1e-5)
+    assert np.array_equal(kept, front)
+    flat = corners.reshape(-1, 3).astype(np.float64)
+    rng = np.random.default_rng(8)
+    aims = points[0, rng.integers(0, points.shape[1], 3000)] + rng.uniform(-4e-4, 4e-4, (3000, 3))
+    found, wanted = (nearest(EYE, aims - EYE, flat[some]) for some in (outline, front))
+    hit = np.isfinite(wanted)
+    wrong = (hit != np.isfinite(found)).sum() / hit.sum()
+    both = hit & np.isfinite(found)
+    deeper = (found[both] - wanted[both]) * np.linalg.norm(aims - EYE, axis=1)[both] / widths.max()
+    print(
+        f"{len(outline)} triangles for {len(front)}; {hit.sum()} rays hit, {100 * wrong:.2f} % of them are wrong, "
+        f"{np.median(deeper):.2f} of a width deeper, {np.quantile(deeper, 0.99):.2f} for 1 %"
+    )
+    assert len(outline) <= 2 * (points.shape[1] - 1) + 4
+    assert hit.sum() > 500
+    assert wrong < 0.01
+    assert 0 <= np.median(deeper) < 0.5
 
 
 def test_corners_go_round_at_half_the_width_and_across_the_strand() -> None:
@@ -144,7 +172,9 @@ def test_straight_and_broken_strands_have_finite_tubes() -> None:
     corners, triangles = kernels.tubes(points, widths, all_drawn(points), 4, EYE)
     assert np.isfinite(corners).all()
     arms = np.linalg.norm(corners[0] - points[0, :, None], axis=2)
-    print(f"{len(triangles)} triangles; the straight strand's corners are {arms.min():.2e} to {arms.max():.2e} m out")
+    print(
+        f"{len(triangles)} triangles; the straight strand's corners are {arms.min():.2e} to {arms.max():.2e} m out"
+    )
     assert np.allclose(arms, 5e-4, rtol=1e-4)
 
 
