@@ -38,6 +38,8 @@ _PARTS: tuple[tuple[Any, str, str], ...] = (
     (kernels.Raster, "count", "sort"),
     (kernels.Raster, "add", "sort"),
     (kernels.Raster, "compose", "draw"),
+    (Lighting, "shade", "shade"),
+    (kernels, "tubes", "tubes"),
     (Target, "clear", "opengl"),
     (Target, "_draw", "opengl"),
     (Target, "read", "opengl"),

@@ -856,6 +856,29 @@ def develop(linear: _F32, encode: NDArray[_Code], scale: float) -> NDArray[_Code
 
     """
 
+# --- strands as tubes (tubes.hpp) -------------------------------------------------------------------
+
+def tubes(
+    points: _F32, widths: _F32, drawn: NDArray[np.bool_], sides: int, eye: _F64, fine: float = 0.0
+) -> tuple[_F32, NDArray[np.int32]]:
+    """Closed tubes around strands, of which only what faces the eye has triangles.
+
+    Args:
+        points: (S, P, 3) float32 [m], P >= 2.
+        widths: (S, P) float32 [m], twice the distance of a corner from its point.
+        drawn: (S, P-1), the segments that have sides; an end has a lid where its segment is drawn.
+        sides: K, 3 to 32.
+        eye: (3,) float64 [m].
+        fine: [rad], a segment that is narrower as seen from the eye is drawn as its outline, two triangles.
+
+    Returns:
+        corners (S, P, K, 3) float32 [m], and triangles (T, 3) over their flat order, outer side against the clock.
+
+    Raises:
+        ValueError: shapes that do not fit, 2^31 corners or more.
+
+    """
+
 # --- strands by coverage (raster.hpp) ---------------------------------------------------------------
 
 class Backdrop:

@@ -44,6 +44,7 @@ void bind_raster(nb::module_ &m);
 void bind_statics(nb::module_ &m);
 void bind_neighbours(nb::module_ &m);
 void bind_step(nb::module_ &m);
+void bind_tubes(nb::module_ &m);
 
 } // namespace ringlet
 
@@ -69,4 +70,5 @@ NB_MODULE(RINGLET_MODULE, m) {
     ringlet::bind_statics(m);
     ringlet::bind_neighbours(m);
     ringlet::bind_step(m);
+    ringlet::bind_tubes(m);
 }

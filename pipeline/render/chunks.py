@@ -47,6 +47,12 @@ class Chunks:
                     self._there.add(i)
             yield first, points
 
+    def pieces(self, most: int) -> Iterator[tuple[int, Points]]:
+        """Give the same, at most so many strands at a time."""
+        for first, points in self:
+            for begin in range(0, len(points), most):
+                yield first + begin, points[begin : begin + most]
+
     def _buffer(self, i: int, count: int) -> Points:
         """Memory for chunk i: its own, or one for all that are not kept."""
         place = min(i, self._fit)

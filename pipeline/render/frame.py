@@ -39,6 +39,7 @@ Linear = NDArray[np.float32]
 
 _MARGIN = 0.02  # [m] that strands may leave the bounds of their guides
 _MELANIN = 31  # salt
+_PIECE = 8192  # strands that OpenGL draws at once: it takes 20 times the memory of their points
 
 
 @dataclass(frozen=True)
@@ -124,15 +125,17 @@ class FrameRenderer:
     def prepare(self, read: Callable[[], Moment]) -> "Future[Moment]":
         """Read the moment that is drawn next, and light it as well, both beside the drawing of this one.
 
-        Where memory does not hold the points of two moments it is only read. At most one moment is prepared at a time.
+        It is only read where memory does not hold the points of two moments, and where OpenGL draws all strands, which
+        keeps the processors busy as it is. At most one moment is prepared at a time.
         """
         if self._next.moment is not None:  # which is drawn from now on
             self._now, self._next = self._next, self._now
         free = self._next
+        ahead = free.chunks.two_fit and self.render.geometry in ("auto", "coverage")
 
         def ready() -> Moment:
             moment = read()
-            if free.chunks.two_fit:
+            if ahead:
                 self._light(free, moment, None)
             return moment
 
@@ -202,7 +205,7 @@ class FrameRenderer:
             return coverage.draw(self._drawn, self.lighting.shader(camera.position))
         wider = max(1.0, 1 / (pixels * self.render.samples)) if shape == "lines" else 1.0
         veil = self.lighting.veil(camera.position, wider)
-        for first, points in self._now.chunks:
+        for first, points in self._now.chunks.pieces(_PIECE):
             self._draw_strands(shape, camera.position, first, points, veil.visible(points))
         return average(self.target.read(), self.render.samples)
 
@@ -262,7 +265,7 @@ class FrameRenderer:
             return
         widths = self._own_widths(points)
         if shape == "tubes":
-            self.target.tubes(points, colours, widths, self.render.tube_sides)
+            self.target.tubes(points, colours, widths, segments, self.render.tube_sides)
             return
         edges, triangles = ribbons(points, widths, eye, segments)
         self.target.triangles(edges.reshape(-1, 3), triangles, np.repeat(colours.reshape(-1, 3), 2, axis=0))

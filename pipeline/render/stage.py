@@ -193,9 +193,9 @@ class Pictures:
 
 def fingerprint(target: Target) -> str:
     """What pixels depend on besides the config: OpenGL, libraries, kernels and processor."""
-    import vtk
+    from vtkmodules.vtkCommonCore import vtkVersion
 
-    libraries = f"vtk {vtk.vtkVersion.GetVTKVersion()}, numpy {np.__version__}"
+    libraries = f"vtk {vtkVersion.GetVTKVersion()}, numpy {np.__version__}"
     machine = f"{_processor()}, {' '.join(platform.libc_ver())}"
     return f"{target.renderer_name}; {libraries}; kernels {kernels.VARIANT}; {machine}"
 

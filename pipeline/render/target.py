@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline import kernels
 from pipeline.errors import InputError
 from pipeline.render.view import View
 
@@ -18,7 +19,6 @@ Points = NDArray[np.float32]
 
 BRIGHTEST = 4.0  # linear value that 255 stands for
 NOTHING = 2.0  # depth where nothing is drawn
-_TUBES = 4096  # strands that are tubes at once: VTK's take 20 times the memory of their points
 _MARGIN = 1e-3  # [m] between what is drawn and the clipping planes
 
 
@@ -37,20 +37,20 @@ class Target:
 
     def __init__(self, width: int, height: int, background: tuple[float, float, float]) -> None:
         """Open an off-screen window of width x height samples. Raises InputError where EGL has no driver."""
-        vtk = _vtk()
-        self._vtk = vtk
+        from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
+
         self.width, self.height = width, height
-        self._renderer = vtk.vtkRenderer()
+        self._window = _open_window()
+        self._renderer = vtkRenderer()
         self._renderer.SetBackground(*(encode(np.array(background)) / 255.0).tolist())
-        self._window = _open_window(vtk)
         self._window.SetOffScreenRendering(1)
         self._window.SetMultiSamples(0)
         self._window.SetSize(width, height)
         self._window.AddRenderer(self._renderer)
-        self._mapper = vtk.vtkPolyDataMapper()
+        self._mapper = vtkPolyDataMapper()
         self._mapper.SetColorModeToDirectScalars()
         self._mapper.SetScalarModeToUsePointData()
-        self._actor = vtk.vtkActor()
+        self._actor = vtkActor()
         self._actor.SetMapper(self._mapper)
         self._actor.GetProperty().LightingOff()
         self._renderer.AddActor(self._actor)
@@ -71,62 +71,56 @@ class Target:
 
     def background(self) -> None:
         """Draw nothing but the background."""
-        self._draw(self._vtk.vtkPolyData())
+        from vtkmodules.vtkCommonDataModel import vtkPolyData
+
+        self._draw(vtkPolyData())
 
     def triangles(self, points: Points, triangles: NDArray[np.integer[Any]], colours: Colours) -> None:
         """Draw triangles (T, 3) over points (N, 3) [m] with linear colours (N, 3)."""
-        mesh = self._poly_data(points, colours)
-        mesh.SetPolys(self._cells(np.arange(0, 3 * len(triangles) + 1, 3), triangles.reshape(-1)))
-        self._draw(mesh)
+        self._draw(self._mesh(points, triangles, encode(colours)))
 
     def lines(self, points: Points, colours: Colours, drawn: NDArray[np.bool_]) -> None:
         """Draw segments (S, P-1) of strands (S, P, 3) [m] as lines one sample wide."""
-        mesh = self._poly_data(points.reshape(-1, 3), colours.reshape(-1, 3))
+        mesh = self._poly_data(points.reshape(-1, 3), encode(colours.reshape(-1, 3)))
         strand, segment = np.nonzero(drawn)
         first = strand * points.shape[1] + segment
         ends = np.stack([first, first + 1], axis=1).reshape(-1)
         mesh.SetLines(self._cells(np.arange(0, len(ends) + 1, 2), ends))
         self._draw(mesh)
 
-    def tubes(self, points: Points, colours: Colours, widths: NDArray[np.float32], sides: int) -> None:
-        """Draw strands (S, P, 3) [m] as tubes of widths (S, P) [m] by VTK's tube filter."""
-        for first in range(0, len(points), _TUBES):
-            part = slice(first, first + _TUBES)
-            self._draw(self._tubes(points[part], colours[part], widths[part], sides))
-
-    def _tubes(self, points: Points, colours: Colours, widths: NDArray[np.float32], sides: int) -> Any:
-        from vtkmodules.util.numpy_support import numpy_to_vtk
-
-        strands, count, _ = points.shape
-        mesh = self._poly_data(points.reshape(-1, 3), colours.reshape(-1, 3))
-        mesh.SetLines(self._cells(np.arange(0, strands * count + 1, count), np.arange(strands * count)))
-        radius = numpy_to_vtk(np.ascontiguousarray(widths.reshape(-1) / 2, np.float64), deep=True)
-        radius.SetName("radius")
-        mesh.GetPointData().AddArray(radius)
-        mesh.GetPointData().SetActiveScalars("radius")
-        tube = self._vtk.vtkTubeFilter()
-        tube.SetInputData(mesh)
-        tube.SetNumberOfSides(sides)
-        tube.SetVaryRadiusToVaryRadiusByAbsoluteScalar()
-        tube.CappingOn()
-        tube.Update()
-        drawn = tube.GetOutput()
-        drawn.GetPointData().SetActiveScalars("colour")
-        return drawn
+    def tubes(
+        self,
+        points: Points,
+        colours: Colours,
+        widths: NDArray[np.float32],
+        drawn: NDArray[np.bool_],
+        sides: int,
+    ) -> None:
+        """Draw segments (S, P-1) of strands (S, P, 3) [m] as closed tubes of widths (S, P) [m], what faces the eye."""
+        view = self._renderer.GetActiveCamera()
+        eye, sample = (
+            np.array(view.GetPosition()),
+            2 * np.tan(np.radians(view.GetViewAngle() / 2)) / self.height,
+        )
+        corners, triangles = kernels.tubes(points, widths, drawn, sides, eye, sample)
+        own = np.repeat(encode(colours).reshape(-1, 3), sides, axis=0)
+        self._draw(self._mesh(corners.reshape(-1, 3), triangles, own))
 
     def read(self) -> NDArray[np.uint8]:
         """The bytes of the framebuffer (H, W, 3), top row first."""
         from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
-        pixels = self._vtk.vtkUnsignedCharArray()
+        pixels = vtkUnsignedCharArray()
         self._window.GetPixelData(0, 0, self.width - 1, self.height - 1, 0, pixels, 0)
         return np.asarray(vtk_to_numpy(pixels)).reshape(self.height, self.width, 3)[::-1]
 
     def depth(self) -> NDArray[np.float32]:
         """Depth of the framebuffer (H, W), top row first: 0 at the near plane, 1 at the far one, 2 where nothing is."""
         from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkCommonCore import vtkFloatArray
 
-        values = self._vtk.vtkFloatArray()
+        values = vtkFloatArray()
         self._window.GetZbufferData(0, 0, self.width - 1, self.height - 1, values)
         depth = np.array(np.asarray(vtk_to_numpy(values)).reshape(self.height, self.width)[::-1])
         depth[depth >= 1] = NOTHING
@@ -162,46 +156,58 @@ class Target:
         self._renderer.PreserveDepthBufferOn()
         self._kept.clear()
 
-    def _poly_data(self, points: Points, colours: Colours) -> Any:
+    def _mesh(self, points: Points, triangles: NDArray[np.integer[Any]], encoded: NDArray[np.uint8]) -> Any:
         from vtkmodules.util.numpy_support import numpy_to_vtk
+        from vtkmodules.vtkCommonDataModel import vtkCellArray
+
+        mesh = self._poly_data(points, encoded)
+        corners = np.ascontiguousarray(triangles, np.int32).reshape(-1)
+        self._kept.append(corners)
+        cells = vtkCellArray()
+        cells.SetData(3, numpy_to_vtk(corners))
+        mesh.SetPolys(cells)
+        return mesh
+
+    def _poly_data(self, points: Points, encoded: NDArray[np.uint8]) -> Any:
+        from vtkmodules.util.numpy_support import numpy_to_vtk
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkPolyData
 
         positions = np.ascontiguousarray(points, np.float32)
-        encoded = encode(colours)
         self._kept += [positions, encoded]  # VTK does not copy them
-        vertices = self._vtk.vtkPoints()
+        vertices = vtkPoints()
         vertices.SetData(numpy_to_vtk(positions))
         scalars = numpy_to_vtk(encoded)
         scalars.SetName("colour")
-        mesh = self._vtk.vtkPolyData()
+        mesh = vtkPolyData()
         mesh.SetPoints(vertices)
         mesh.GetPointData().SetScalars(scalars)
         return mesh
 
     def _cells(self, offsets: NDArray[Any], connectivity: NDArray[Any]) -> Any:
         from vtkmodules.util.numpy_support import numpy_to_vtk
+        from vtkmodules.vtkCommonDataModel import vtkCellArray
 
         arrays = [np.ascontiguousarray(a, np.int64) for a in (offsets, connectivity)]
         self._kept += arrays
-        cells = self._vtk.vtkCellArray()
+        cells = vtkCellArray()
         cells.SetData(*(numpy_to_vtk(a) for a in arrays))
         return cells
 
 
-def _open_window(vtk: Any) -> Any:
-    log = vtk.vtkLogger
+def _open_window() -> Any:
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    # The modules one by one: all of VTK is 80 MB and a third of a second more
+    import vtkmodules.vtkRenderingOpenGL2  # noqa: F401
+    from vtkmodules.vtkCommonCore import vtkLogger as log  # noqa: N813
+    from vtkmodules.vtkRenderingCore import vtkRenderWindow
+
     shown = log.GetCurrentVerbosityCutoff()
     log.SetStderrVerbosity(log.VERBOSITY_OFF)  # VTK's own words about what is missing name no remedy
-    window = vtk.vtkRenderWindow()
+    window = vtkRenderWindow()
     log.SetStderrVerbosity(shown)
     if window.GetClassName() != "vtkEGLRenderWindow":
         raise InputError(
             "render: no off-screen OpenGL; install it by: sudo apt-get install -y libegl1 libgl1-mesa-dri"
         )
     return window
-
-
-def _vtk() -> Any:
-    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    import vtk
-
-    return vtk
