@@ -27,7 +27,7 @@ app = App(
     help="Batch hair pipeline: config -> groom -> simulate -> interpolate -> render.",
     help_format="plaintext",
     help_epilogue=(
-        "Exit codes: 0 done; 1 a check failed; 2 wrong input, or too little disk or memory;\n"
+        "Exit codes: 0 done; 1 a check failed; 2 wrong input, too little disk or memory;\n"
         "70 a fault of ringlet; 129, 130, 143 stopped by SIGHUP, SIGINT, SIGTERM."
     ),
     version=lambda: importlib.metadata.version("ringlet"),

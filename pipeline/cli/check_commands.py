@@ -25,7 +25,10 @@ app.command(bench)
 @app.command(group=CHECK_GROUP)
 def validate(
     case: Annotated[
-        str, Parameter(help="Only cases with this in their name, such as cantilever or rotor.")
+        str,
+        Parameter(
+            show_default=False, help="Only cases with this in their name, such as cantilever or rotor."
+        ),
     ] = "",
     *,
     quick: Annotated[

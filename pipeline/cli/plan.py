@@ -38,14 +38,11 @@ _RENDER_S_PER_SAMPLE = 0.05e-6
 _RENDER_B_PER_POINT = 30  # of the strands in flight
 _RENDER_B_PER_SAMPLE = 60
 _RENDER_B_PER_SEGMENT = 14  # of strands that may be seen, sorted into tiles
-_LIGHT_B_PER_NODE = (
-    430  # of a light's shadow map, which has three nodes a voxel; of two moments, and while it is made
-)
+# Of a light's shadow map, which has three nodes a voxel; of two moments, and while it is made
+_LIGHT_B_PER_NODE = 430
 _LIGHT_B_PER_VOXEL = 59  # of density and sky
 _NODES = 9  # of a map over the square of the voxels along the longest side
 _BOUND_B = 70  # of a strand's binding in memory, and its order
-_IN_FLIGHT = 65_536  # strands: the renderer's chunk
-_KEPT_B = 200 << 20  # points that the renderer keeps between its two passes
 _PNG_B_PER_PIXEL = 0.5
 
 
@@ -110,6 +107,8 @@ def _interpolate(config: Config) -> Cost:
 
 
 def _render(config: Config) -> Cost:
+    from pipeline.render.chunks import CHUNK, KEPT
+
     render, frames = config.render, config.simulate.frames
     strands = min(render.strands or _strands(config), _strands(config))
     points = strands * config.groom.points * render.subdivide
@@ -120,11 +119,10 @@ def _render(config: Config) -> Cost:
     if camera.shutter or camera.f_stop is not None:
         frame *= render.passes
     all_points = 12 * strands * config.groom.points
-    kept = min(all_points, _KEPT_B)
-    in_flight = points * min(1.0, _IN_FLIGHT / strands)
-    shapes = 12 * min(config.groom.strands, _strands(config)) * config.groom.points + _BOUND_B * _strands(
-        config
-    )
+    kept = min(all_points, KEPT)
+    in_flight = points * min(1.0, CHUNK / strands)
+    own = min(config.groom.strands, _strands(config))
+    shapes = 12 * own * config.groom.points + _BOUND_B * _strands(config)
     memory = kept + shapes + _RENDER_B_PER_POINT * in_flight + _RENDER_B_PER_SAMPLE * samples
     memory += _RENDER_B_PER_SEGMENT * points + _light(config)
     return Cost(

@@ -52,9 +52,8 @@ def load_mesh(path: Path, unit_scale: float = 1.0, up_axis: str = "y", face_axis
     uv = None
     if file.uv is not None:
         uv = file.uv[file.faces[kept]]
-        uv = np.where(
-            (given[:, 0] != faces[:, 0])[:, None, None], uv[:, ::-1], uv
-        )  # of triangles turned over
+        turned_over = (given[:, 0] != faces[:, 0])[:, None, None]
+        uv = np.where(turned_over, uv[:, ::-1], uv)
     arrays = {name: values[first] for name, values in file.arrays.items()}
     return Mesh(points.astype(np.float32), np.ascontiguousarray(faces, np.int32), uv, arrays)
 

@@ -22,10 +22,8 @@ Vectors = NDArray[np.float64]
 Pins = NDArray[np.uint8]
 
 _FAR = 0.05  # [m] roots this far from the head are those of another head, or in another unit
-_COARSEST, _FINEST = (
-    4,
-    1 << 16,
-)  # cells along a side of the groom, first and last round of the progressive order
+# Cells along a side of the groom, first and last round of the progressive order
+_COARSEST, _FINEST = 4, 1 << 16
 _ORDER, _KEY = 3, 7  # salts
 
 

@@ -17,10 +17,8 @@ from pipeline.config.schema import Camera
 from pipeline.errors import InputError
 from pipeline.render.view import Place, View
 
-_POSITION, _LOOK_AT = (
-    (0.40, 0.02, 0.80),
-    (0.0, -0.03, 0.0),
-)  # [m] from the built-in head, unless they are told
+# [m] from the built-in head, unless they are told
+_POSITION, _LOOK_AT = (0.40, 0.02, 0.80), (0.0, -0.03, 0.0)
 _Curve = Callable[[float], NDArray[np.float64]]
 
 

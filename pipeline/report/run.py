@@ -46,9 +46,8 @@ def run_page(loaded: Loaded, experiment: cache.Experiment) -> str:
 
 def write_run_page(loaded: Loaded, experiment: cache.Experiment) -> Path:
     """Write the page into the experiment's folder; returns its path."""
-    remove_stale(
-        experiment.folder
-    )  # of a process that was killed here; a run with nothing to do removes nothing else
+    # Of a process that was killed here; a run with nothing to do removes nothing else
+    remove_stale(experiment.folder)
     with cache.replacing(experiment.report) as temporary:
         temporary.write_text(run_page(loaded, experiment), "utf-8")
     return experiment.report

@@ -83,7 +83,7 @@ def sweep_page(sweep: Row, folder: Path) -> str:
 
 _HELP = (
     "Keys: space plays, arrow keys step. A click on a column's head sorts the table and the pictures. Energies, strain and "
-    "penetration are the largest of all frames, gravity is its span; seconds of a stage that another experiment made are in brackets."
+    "penetration are the largest of all frames, gravity is its span; a stage that another experiment made says so."
 )
 
 
@@ -221,17 +221,10 @@ def _metric(value: float | None, factor: float) -> Html:
 
 
 def _seconds(stage: Row) -> Html:
-    seconds = stage.get("seconds")
-    if seconds is None:
-        return _cell("")
-    text = f"{seconds:.1f}"
-    shared = stage.get("shared_with")
-    return tag(
-        "span",
-        f"({text})" if shared else text,
-        data_value=repr(float(seconds)),
-        title=f"made by {shared}" if shared else None,
-    )
+    seconds, owner = stage.get("seconds"), stage.get("shared_with")
+    if owner:
+        return tag("span", "shared", data_value="", title=f"made by {owner}")
+    return _cell("") if seconds is None else tag("span", f"{seconds:.1f}", data_value=repr(float(seconds)))
 
 
 def _word(value: Any) -> str:

@@ -7,9 +7,8 @@ from pipeline import kernels
 from pipeline.config.schema import Hair, Simulate
 from pipeline.simulate.section import bending_stiffness, lay_sections, mass_per_length, twisting_stiffness
 
-_STRAIGHTEST_CURL = (
-    20.0  # [1/m]; wavy hair bends with radii up to 5 cm, the torsion of what bends less is noise
-)
+# [1/m]: wavy hair bends with radii up to 5 cm, the torsion of what bends less is noise
+_STRAIGHTEST_CURL = 20.0
 
 _LOOK_AHEAD = 0.3  # [rad] that a segment is expected to turn at most
 

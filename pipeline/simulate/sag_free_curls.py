@@ -26,9 +26,8 @@ _STIFFNESS = ("bending", "weight", "root_weight")
 _SHAPE = ("curvature", "dihedral", "root_shift")
 
 _LADDER = 1.5  # ratio of the factors that are tried
-_CORRECTIONS = (
-    3  # kappa is rounded a little by its rest value, so that a joint is solved again with what was left
-)
+# kappa is rounded a little by its rest value, so that a joint is solved again with what was left
+_CORRECTIONS = 3
 _STEP = 1e-5  # [rad] of the differences
 _NO_BEND = 1e-9  # sine below which a bend has no direction
 _REACH = 2  # segments to either side that a segment is coupled to

@@ -103,9 +103,8 @@ def segments_at(lengths: NDArray[np.float64], wanted: NDArray[np.float64]) -> ND
     strands, count = lengths.shape
     row = np.arange(strands)[:, None]
     whole = np.maximum(lengths[:, -1:], 1e-300)
-    along, sought = (
-        2 * row + at / whole for at in (lengths, wanted)
-    )  # in a row, so that one search serves all
+    # In a row, so that one search serves all
+    along, sought = (2 * row + at / whole for at in (lengths, wanted))
     left = np.searchsorted(along.ravel(), sought.ravel(), "right").reshape(wanted.shape) - 1 - row * count
     return np.asarray(np.clip(left, 0, count - 2))
 

@@ -41,7 +41,7 @@ def sweep_of(folder: Path) -> Path:
                 "stages": {
                     stage: {
                         "key": "k",
-                        "seconds": None if not count else 1.5,
+                        "seconds": None if index else 1.5,
                         "shared_with": None if not index else "first",
                     }
                     for stage in STAGES
@@ -147,7 +147,9 @@ def test_names_and_values_stay_text(tmp_path: Path, visit: Visit) -> None:
     assert page.locator("img:not([src^='data:'])").count() == 0
     assert HOSTILE in page.locator(".card").first.inner_text()
     assert "1 not up to date" in page.inner_text("body")
-    assert "(1.5)" in page.inner_text("#figures")
+    figures = page.inner_text("#figures")
+    assert figures.count("1.5") == len(STAGES)
+    assert figures.count("shared") == 2 * len(STAGES)
 
 
 def test_a_file_that_is_no_table_is_refused(tmp_path: Path) -> None:

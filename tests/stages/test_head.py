@@ -37,9 +37,8 @@ def test_the_head_is_its_own_mirror_image(mannequin: Head) -> None:
     mesh = np.abs(distance.distance(mannequin.skin.points * np.float32([-1, 1, 1]))).max()
     print(f"left against right: formula {formula:.1e} m, grid {grid:.1e} m, mesh {mesh:.1e} m")
     assert formula < 1e-12
-    assert (
-        grid < 3e-3
-    )  # a cell, deep inside, where the grid is swept; two different meshes could not be nearer there
+    # A cell, deep inside, where the grid is swept; two different meshes could not be nearer there
+    assert grid < 3e-3
     assert mesh < 2e-4
 
 

@@ -58,9 +58,8 @@ def test_the_head_holds_strands_at_the_ring_and_nowhere_else(mannequin: Head, ti
     ring = Ring.on(mannequin.fitted_field, TAIL)
     inner = tied.held[:, 2:].astype(bool)
     away = np.abs((tied.points[:, 2:] - ring.middle) @ ring.axis)[inner]
-    below = (
-        np.linalg.norm(tied.points[:, 0] - ring.middle, axis=1) < 0.03
-    )  # roots whose own clamp is at the ring
+    # Roots whose own clamp is at the ring
+    below = np.linalg.norm(tied.points[:, 0] - ring.middle, axis=1) < 0.03
     print(
         f"{below.sum()} roots below the ring; held points at most {1000 * away.max():.1f} mm from its plane"
     )

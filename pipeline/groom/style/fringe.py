@@ -14,10 +14,8 @@ from pipeline.groom.style.growth import Sprouts, grown, stretches
 from pipeline.groom.style.hair import STEP, Hair, Vectors, cut_to, set_apart, unit
 
 _UNEVEN, _TURN = 0, 1  # uses of chance
-_FRONT, _ROUND = (
-    0.089,
-    0.06,
-)  # [m] the hairline over the forehead: z of its middle, and its radius seen from above
+# [m] the hairline over the forehead: z of its middle, and its radius seen from above
+_FRONT, _ROUND = 0.089, 0.06
 _TILT = 1.1  # [rad] between the first direction and the skin's normal
 _LONGEST = 0.20  # [m]
 _SHORTEST = 0.01  # [m]

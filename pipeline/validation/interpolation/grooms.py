@@ -23,11 +23,8 @@ LENGTH = 0.2
 HEAD = 0.09
 """Radius of the head [m]."""
 
-_SKIN, _LAYERS, _OPENS = (
-    1e-3,
-    0.015,
-    0.03,
-)  # [m] lowest layer over the curls, spread of the layers, ramp of the helix
+# [m] lowest layer over the curls, spread of the layers, ramp of the helix
+_SKIN, _LAYERS, _OPENS = 1e-3, 0.015, 0.03
 _PHASE_WAVELENGTH = 0.04  # [m] over the scalp
 _RISES, _STEEPEST = 0.02, 0.7  # [m] over which a strand rises to its layer, and its steepest rise
 _FINE = 400  # points of the middle line
@@ -82,9 +79,8 @@ def round_head(spacing: float = 3e-3) -> Field:
 
 def _middle_lines(kind: Kind, index: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
     """Points, normals in the plane and normals across it, (S, Q, 3) each, of lines as long as a strand."""
-    height = 1 - 0.95 * (
-        (index + 0.5) * 0.7548776662466927 % 1
-    )  # any prefix is even: a sequence of low discrepancy
+    # Any prefix is even: a sequence of low discrepancy
+    height = 1 - 0.95 * ((index + 0.5) * 0.7548776662466927 % 1)
     azimuth = 2 * np.pi * ((index + 0.5) * 0.5698402909980532 % 1)
     plane = _combed(np.asarray(height), _layers(kind, np.asarray(height), index))
     t = np.gradient(plane, axis=1)
