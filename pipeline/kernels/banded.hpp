@@ -30,13 +30,13 @@ template <class Real, int Unknowns, int Reach> struct Pivots {
     /// Entry at column > row.
     RINGLET_INLINE L &at(int row, int column) { return factor[triangle(Band - 1, row) + column - 1]; }
 
-    /// Of the unknowns `known` = (x_{i+1}, E_{i+1}, ...) makes (x_i, E_i, ...).
-    RINGLET_INLINE void substitute(L (&known)[Reach + 3 - Unknowns]) {
+    /// Of the unknowns `known` = (x_{i+1}, E_{i+1}, ...) makes (x_i, E_i, ...), for the eliminated right side `from`.
+    RINGLET_INLINE void substitute(const L (&from)[Unknowns], L (&known)[Reach + 3 - Unknowns]) {
         constexpr int rest = Reach + 3 - Unknowns;
         L own[Unknowns];
 #pragma GCC unroll 4
         for (int a = Unknowns - 1; a >= 0; --a) {
-            L sum = right[a];
+            L sum = from[a];
 #pragma GCC unroll 16
             for (int k = rest - 1; k >= 0; --k) sum -= at(a, Unknowns + k) * known[k];
 #pragma GCC unroll 4
@@ -49,6 +49,31 @@ template <class Real, int Unknowns, int Reach> struct Pivots {
         for (int k = 0; k < Unknowns && 3 + k < rest; ++k) known[3 + k] = own[k];
 #pragma GCC unroll 4
         for (int k = 0; k < 3; ++k) known[k] -= own[k];
+    }
+
+    /// Eliminates E_i from another right side, `point` by x_i and `edges` by E_i and those after it: gives its part of the
+    /// eliminated right side, and leaves what is seen from the next point. `held`, `fixed`: the point and the edge's
+    /// fourth unknown are known.
+    RINGLET_INLINE void reduce(Mask<Real> held, Mask<Real> fixed, L (&point)[3], L (&edges)[Reach - Unknowns],
+                               L (&own)[Unknowns]) {
+        constexpr int R = Reach - Unknowns;
+#pragma GCC unroll 4
+        for (int a = 0; a < Unknowns; ++a) {
+            L value = a < 3 ? edges[a] - point[a] : edges[a];
+            for (int k = 0; k < a; ++k) value -= at(k, a) * own[k];
+            own[a] = select<Real>(a < 3 ? held : fixed, L{}, inverse[a] * value);
+        }
+#pragma GCC unroll 3
+        for (int k = 0; k < 3; ++k) {
+            point[k] = select<Real>(held, edges[k], point[k]); // x_{i+1} takes the place of e_i
+            for (int a = 0; a < Unknowns; ++a) point[k] -= at(a, Unknowns + k) * own[a];
+        }
+#pragma GCC unroll 16
+        for (int c = Unknowns; c < Reach; ++c) {
+            L value = c < R ? edges[c] : L{};
+            for (int a = 0; a < Unknowns; ++a) value -= at(a, 3 + c) * own[a];
+            edges[c - Unknowns] = value;
+        }
     }
 };
 

@@ -21,6 +21,8 @@ inline constexpr double kRow = 1e3;         // stiffness of a row, in m / dt^2
 inline constexpr double kKeepGap = 0.2e-3;  // [m] a contact that pushed keeps its row up to this gap
 inline constexpr double kKeepWeight = 0.2;  // and closes this part of the gap
 inline constexpr double kPull = 0.01;       // [m/s^2] a row that pulls more than this is dropped
+inline constexpr int kReleases = 2;         // times that rows are dropped in a step
+inline constexpr int kDroppedMost = 8;      // rows of a lane that are taken out of a solution (dropped_rows.hpp)
 inline constexpr double kDepth = 0.05e-3;   // [m] depth below the offset that is let pass
 inline constexpr double kWay = 0.7;         // [cells] a shorter way in a step cannot lead through what cells resolve
 
@@ -104,13 +106,14 @@ template <class Real> struct Contacts {
     Mask<Real> *cell;          // its cell in the field, -1 for none, and what was read there
     Corners<Real> *corners;
     L *row, *gap, *N;          // rows: 1 where one acts, g', contact force of the solve
+    L *dropped;                // in which release of this step a row has been dropped (1, 2, ...), else 0
     L *a, *s, *fresh, *stuck;  // rounds: contact holds, worth, new part of s, held by friction
     bool any_row = false;
 
     Contacts(Arena &arena, int P)
         : n(arena.take<Vec3<Real>>(P)), nearby(arena.take<Vec3<Real>>(P)), start(arena.take<Vec3<Real>>(P)),
           cell(arena.take<Mask<Real>>(P)), corners(arena.take<Corners<Real>>(P)) {
-        for (auto **array : {&phi, &row, &gap, &N, &a, &s, &fresh, &stuck}) *array = arena.take<L>(P);
+        for (auto **array : {&phi, &row, &gap, &N, &dropped, &a, &s, &fresh, &stuck}) *array = arena.take<L>(P);
     }
 
     /// Forgets the samples: nothing is known to be far.
@@ -158,7 +161,7 @@ template <class Real> struct Contacts {
         if (head.deformation) age(b.P, Real(std::abs(head.drift) * head.deformation->fastest));
         const L passed = splat(Real(-kDepth)), keep = splat(Real(kKeepGap));
         for (int i = 0; i < b.P; ++i) {
-            row[i] = none, a[i] = none, s[i] = none, fresh[i] = none, stuck[i] = none, N[i] = none;
+            row[i] = none, dropped[i] = none, a[i] = none, s[i] = none, fresh[i] = none, stuck[i] = none, N[i] = none;
             if (!head.field || i < b.first) continue;
             start[i] = head.was(from.x[i]);
             L distance;
@@ -173,19 +176,43 @@ template <class Real> struct Contacts {
             n[i] = select(on, normal, n[i]);
             any_row = any_row || any<Real>(on);
         }
+        if (any_row) keep_deepest(b, from);
     }
 
-    /// Step b: contact forces of the solution u; drops rows that pull. True when one was dropped.
-    bool release(const Block<Real> &b, const Motion<Real> &from, const Vec3<Real> *u, Real dt) {
-        bool dropped = false;
+    /// Of points that come upon the head next to one another only the deepest keep their rows: a stiff strand takes the
+    /// others along, and their rows would pull.
+    void keep_deepest(const Block<Real> &b, const Motion<Real> &from) {
+        const auto below = [&](int i) { return i < b.P ? select<Real>(row[i] > none, gap[i], none) : none; };
+        L before = none, here = below(b.first);
+        for (int i = b.first; i < b.P; ++i) {
+            const L after = below(i + 1);
+            const Mask<Real> deepest = (here <= before) & (here <= after);
+            row[i] = select<Real>(deepest | (from.touch[i] == one), row[i], none);
+            before = here, here = after;
+        }
+    }
+
+    /// Step b: contact forces of the solution u in some lanes; drops rows that pull. `number` 1, 2, ...
+    /// Returns the lanes with such rows.
+    Mask<Real> release(const Block<Real> &b, const Motion<Real> &from, const Vec3<Real> *u, Real dt, int number,
+                       Mask<Real> lanes) {
+        Mask<Real> found{};
         const Real k = Real(kRow) / (dt * dt);
         for (int i = b.first; i < b.P; ++i) {
-            N[i] = row[i] * (-k) * (gap[i] + dt * dot(n[i], u[i] - from.v[i]));
-            Mask<Real> pulls = N[i] < Real(-kPull);
-            dropped = dropped || any<Real>(pulls);
+            N[i] = select<Real>(lanes, row[i] * (-k) * (gap[i] + dt * dot(n[i], u[i] - from.v[i])), N[i]);
+            const Mask<Real> pulls = lanes & (N[i] < Real(-kPull));
+            found |= pulls;
             row[i] = select<Real>(pulls, none, row[i]);
+            dropped[i] = select<Real>(pulls, splat(Real(number)), dropped[i]);
         }
-        return dropped;
+        return found;
+    }
+
+    /// Lanes in which so many rows have been dropped that it is cheaper to solve without them than to take them out.
+    Mask<Real> too_many_dropped(const Block<Real> &b) const {
+        L count = none;
+        for (int i = b.first; i < b.P; ++i) count += select<Real>(dropped[i] > none, one, none);
+        return count > Real(kDroppedMost);
     }
 
     /// Step c: what the forces of the rows are worth as displacements.

@@ -9,7 +9,7 @@
 // Forces, matrix and elimination are one sweep over the points from the root: see banded.hpp.
 #pragma once
 
-#include "contact.hpp"
+#include "dropped_rows.hpp"
 #include "kirchhoff.hpp"
 #include "neighbours.hpp"
 #include "settings.hpp"
@@ -144,19 +144,17 @@ template <class Real> struct Terms<Real, Torsion::kirchhoff> : RodRows<Real> {
 /// The solver of one torsion model; it has memory for P points.
 template <class Real, Torsion torsion> class Solver {
     using L = Lanes<Real>;
+    using M = Mask<Real>;
     using Begins = Terms<Real, torsion>;
     static constexpr bool turns = torsion == Torsion::kirchhoff;
     static constexpr int Unknowns = Begins::Unknowns, Reach = Begins::Reach, Span = kSpan<torsion>;
 
   public:
     Solver(Arena &arena, int P)
-        : terms_(arena.take<Begins>(P)), pivots_(arena.take<Pivots<Real, Unknowns, Reach>>(P)), window_(arena) {}
+        : pivots_(arena.take<Pivots<Real, Unknowns, Reach>>(P)), window_(arena), dropped_(arena, P) {}
 
-    /// Solves for the velocities. `again`: as before but for the rows of contacts. To keep the terms for that costs a
-    /// tenth of a solve, so they are kept only after a step that has solved again; else they are assembled again.
-    void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
-        if (!again) keeps_ = eq.contacts.any_row && solved_again_;
-        solved_again_ = again;
+    /// Solves for the velocities of some lanes.
+    void solve(const Equation<Real> &eq, M lanes, const Velocities<Real> &to) {
         const Block<Real> &b = eq.b;
         const int first = std::max(b.first - 1, 0); // the edge before the first free point
         const Scale<Real> scale = stiffness_scale(eq);
@@ -164,28 +162,44 @@ template <class Real, Torsion torsion> class Solver {
         if constexpr (torsion == Torsion::rotor)
             if (b.clamped) add_root(eq, scale, to.spin[0] * eq.edges.il[0]);
         for (int i = 0; i < b.P; ++i) {
-            Begins &terms = terms_[keeps_ ? i : 0];
-            if (!(again && keeps_)) assemble(eq, i, scale, terms);
+            Begins terms;
+            assemble(eq, i, scale, terms);
             if (i < first) pass(i, to, terms);
             else eliminate(eq, i, to, terms);
         }
+        substitute(eq, lanes, to, [&](int i, L (&right)[Unknowns]) { std::copy_n(pivots_[i].right, Unknowns, right); });
+    }
+
+    /// Takes the rows that have been dropped out of the velocities of the last `solve` of all lanes, in some lanes.
+    /// `release` counts from 1 since then.
+    void drop(const Equation<Real> &eq, int release, M lanes, const Velocities<Real> &to) {
+        if (release == 1) std::copy_n(to.u, eq.b.P, dropped_.solved);
+        dropped_.reduce(eq.b, eq.contacts, eq.from.v, Real(eq.step.dt), release, lanes, pivots_);
+        substitute(eq, lanes, to, [&](int i, L (&right)[Unknowns]) { dropped_.add(i, pivots_[i].right, right); });
+    }
+
+  private:
+    Pivots<Real, Unknowns, Reach> *pivots_;
+    Window<Real, Unknowns, Reach> window_;
+    DroppedRows<Real, Unknowns, Reach> dropped_;
+
+    /// Velocities in some lanes from eliminated right sides, which `right_of(i, right)` gives, from the tip to the root.
+    template <class RightOf>
+    RINGLET_INLINE void substitute(const Equation<Real> &eq, M lanes, const Velocities<Real> &to, RightOf right_of) {
+        const Block<Real> &b = eq.b;
         L known[Reach + 3 - Unknowns]{};
-        for (int i = b.P - 1; i >= first; --i) {
-            pivots_[i].substitute(known);
-            if constexpr (turns) to.spin[i] = known[6];
+        for (int i = b.P - 1; i >= std::max(b.first - 1, 0); --i) {
+            L right[Unknowns];
+            right_of(i, right);
+            pivots_[i].substitute(right, known);
+            if constexpr (turns) to.spin[i] = select<Real>(lanes, known[6], to.spin[i]);
             if (b.held_inside || i < b.first) {
                 const L given[3] = {to.u[i].x, to.u[i].y, to.u[i].z};
                 for (int k = 0; k < 3; ++k) known[k] = select<Real>(b.free[i] > 0, known[k], given[k]);
             }
-            to.u[i] = {known[0], known[1], known[2]};
+            to.u[i] = select(lanes, Vec3<Real>{known[0], known[1], known[2]}, to.u[i]);
         }
     }
-
-  private:
-    Begins *terms_;
-    bool keeps_ = false, solved_again_ = false;
-    Pivots<Real, Unknowns, Reach> *pivots_;
-    Window<Real, Unknowns, Reach> window_;
 
     /// Eliminates the edge at point i, with the point's contact.
     RINGLET_INLINE void eliminate(const Equation<Real> &eq, int i, const Velocities<Real> &at, const Begins &terms) {
@@ -327,11 +341,12 @@ template <class Real> struct Solvers {
         : none(arena, torsion == Torsion::none ? P : 0), rotor(arena, torsion == Torsion::rotor ? P : 0),
           frenet(arena, torsion == Torsion::frenet ? P : 0), kirchhoff(arena, torsion == Torsion::kirchhoff ? P : 0) {}
 
-    void solve(const Equation<Real> &eq, bool again, const Velocities<Real> &to) {
-        if (eq.settings.torsion == Torsion::kirchhoff) kirchhoff.solve(eq, again, to);
-        else if (eq.settings.torsion == Torsion::rotor) rotor.solve(eq, again, to);
-        else if (eq.settings.torsion == Torsion::frenet) frenet.solve(eq, again, to);
-        else none.solve(eq, again, to);
+    /// Hands the solver of the model to `use`.
+    template <class Use> void with(Torsion torsion, Use use) {
+        if (torsion == Torsion::kirchhoff) use(kirchhoff);
+        else if (torsion == Torsion::rotor) use(rotor);
+        else if (torsion == Torsion::frenet) use(frenet);
+        else use(none);
     }
 };
 

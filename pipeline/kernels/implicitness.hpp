@@ -3,7 +3,7 @@
 // A joint that could swing much faster than it is looked at is taken by a step of theta to -(1 - theta)/theta of its
 // swing. What is linear dies out by that; but the correction of lengths puts some of it back, and from some stiffness
 // on more than the step takes: short strands of many points thrash, and end in loops
-// (test_short_strands_of_fine_spacing_rest_after_a_shake). With theta = 1 nothing of it is left. The measure is
+// (test_short_strands_of_fine_spacing_neither_thrash_nor_ring). With theta = 1 nothing of it is left. The measure is
 //
 //     N = B dt^2 / (m dl^3),      B the largest stiffness of a joint, m the mass of a point, dl the smallest spacing,
 //

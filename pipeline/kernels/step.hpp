@@ -16,7 +16,7 @@
 
 namespace ringlet {
 
-inline constexpr int kHalvings = 6, kResolves = 2;
+inline constexpr int kHalvings = 6;
 
 /// What happened, added up over the steps of a block. Per lane where lanes differ.
 template <class Real> struct Tally {
@@ -156,7 +156,7 @@ template <class Real> class Stepper {
         hold_directors(interval, from, to);
         contacts.find_rows(block, head, from, dt);
         if (settings_.is_explicit) explicit_velocities(interval, from, to);
-        else implicit_velocities(interval, from, to);
+        else implicit_velocities(interval, from, to, wanted);
         for (int i = block.first; i < block.P; ++i) {
             star_[i] = select(block.free[i] > 0, from.x[i] + splat(dt) * u_[i], to.x[i]);
             to.x[i] = star_[i];
@@ -199,16 +199,32 @@ template <class Real> class Stepper {
         if (!has_directors()) std::copy_n(from.twist, block.P, to.twist);
     }
 
-    /// Banded solve; rows that would pull are dropped and the system is solved again.
-    void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to) {
+    /// Banded solve; rows that would pull are dropped and taken out of the solution, at most twice.
+    void implicit_velocities(const Interval<Real> &interval, const Motion<Real> &from, Motion<Real> &to, M wanted) {
         const Equation<Real> equation{block,    from,   interval, settings_,        contacts,
                                       edges_, start_, directors_.joints, outside};
-        for (int again = 0;; ++again) {
+        solvers_.with(settings_.torsion, [&](auto &solver) {
+            const Velocities<Real> unknown{u_, directors_.spin};
+            const auto release = [&](int number, M lanes) {
+                return contacts.release(block, from, u_, Real(interval.dt), number, lanes);
+            };
+            solver.solve(equation, ~M{}, unknown);
             ++tally.solves;
-            solvers_.solve(equation, again > 0, {u_, directors_.spin});
-            if (!contacts.any_row) break;
-            if (!contacts.release(block, from, u_, Real(interval.dt)) || again == kResolves) break;
-        }
+            if (!contacts.any_row) return;
+            M many{}, pulled = release(1, wanted);
+            for (int number = 1; number <= kReleases; ++number) {
+                many |= pulled & contacts.too_many_dropped(block);
+                pulled &= ~many;
+                if (!any<Real>(pulled)) break;
+                solver.drop(equation, number, pulled, unknown);
+                pulled = release(number + 1, pulled);
+            }
+            for (int again = 0; any<Real>(many) && again < kReleases; ++again) {
+                solver.solve(equation, many, unknown);
+                ++tally.solves;
+                many = release(again + 2, many);
+            }
+        });
         predict_tensions(equation, u_, to.T);
     }
 

@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 from named_strands import helix
 from numpy.typing import NDArray
-from strand_scenes import STILL, Report, drive, field, ground, hairy_sphere, settings, shake, shape, sphere
+from strand_scenes import (
+    STILL,
+    Report,
+    copy,
+    drive,
+    field,
+    ground,
+    hairy_sphere,
+    settings,
+    shake,
+    shape,
+    sphere,
+)
 
 from pipeline import kernels
 
@@ -196,3 +208,27 @@ def test_distance_field_refuses_bad_grids() -> None:
         kernels.DistanceField(np.zeros((4, 4, 4), np.float32), np.zeros(3), 0.0)
     with pytest.raises(ValueError, match="finite"):
         kernels.DistanceField(np.full((4, 4, 4), np.nan, np.float32), np.zeros(3), 0.01)
+
+
+@pytest.mark.parametrize("torsion", ["none", "frenet", "kirchhoff"])
+@pytest.mark.parametrize(("precision", "tolerance"), [(np.float64, 1e-15), (np.float32, 1e-9)])
+def test_contacts_that_pull_leave_the_step_as_if_they_had_never_been(
+    torsion: str, precision: type, tolerance: float
+) -> None:
+    """Waves of 0.2 to 2 mm that lie on the ground on their crests; then all points near it are told to have touched."""
+    x = np.linspace(0, 0.25, 32)
+    points = np.zeros((11, 32, 3))
+    points[:, :, 0] = x
+    points[:, :, 1] = 1.01e-3 + 1e-4 * np.arange(1, 12)[:, None] * (1 - np.cos(2 * np.pi * x / 0.04))
+    rest, start, step = shape(points), kernels.at_rest(points.astype(precision)), settings(torsion=torsion)
+    kernels.advance(start, rest, ground(), drive(40), step)
+    start.contact[:] = start.points[:, :, 1] - rest.offset < 3e-5
+    tried, without = copy(start), copy(start)
+    report = kernels.advance(tried, rest, ground(), drive(1), step)
+    without.contact[:] = start.contact * (tried.contact == 1)
+    kernels.advance(without, rest, ground(), drive(1), step)
+    kept, apart = (without.contact == 1).sum(), np.abs(tried.points - without.points).max()
+    print(f"{start.contact.sum()} contacts tried, {kept} press; {apart:.1e} m apart")
+    assert report.solves == 1
+    assert 0 < kept < start.contact.sum()
+    assert apart < tolerance
