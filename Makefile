@@ -96,7 +96,7 @@ sweep: $(if $(NAME),outputs/$(NAME)/sweep) ## all experiments of CONFIG's [sweep
 
 # --- Checks --------------------------------------------------------------------------------------
 
-.PHONY: test lint validate interpolation gallery docs site images approve bench sanitize schema fuzz coverage wheel
+.PHONY: test lint validate interpolation performance gallery docs site images approve bench sanitize schema fuzz coverage wheel
 test: env ## all tests
 	$(BIN)/pytest -n 2 --dist loadfile
 
@@ -111,6 +111,9 @@ validate: env ## the physics against closed forms and rod equations; writes docs
 
 interpolation: env ## strands that follow guides against their own simulation; writes docs/interpolation.md
 	$(RINGLET) bench interpolation-error --page docs/interpolation.md
+
+performance: env ## all benchmarks, on an idle machine: eight minutes; writes docs/performance.md
+	$(RINGLET) bench page docs/performance.md
 
 gallery: env ## every style and every operator, rendered; writes docs/gallery.md and docs/operators.md
 	$(BIN)/python docs/gallery.py

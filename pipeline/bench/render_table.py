@@ -3,16 +3,13 @@
 Every row is measured in a process of its own, so that its peak of memory is its own.
 """
 
-import json
-import subprocess
-import sys
-import tempfile
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from pipeline.bench import command
 
 _COUNTS = (10_000, 30_000, 100_000, 300_000, 1_000_000)
 _SPLIT = 100_000
@@ -55,19 +52,11 @@ def table(config: Path | None, most: int = _COUNTS[-1]) -> dict[str, Any]:
 
 
 def _row(what: str, *options: object) -> Row:
-    command = [sys.executable, "-m", "pipeline", "bench", "render", "--json", *map(str, options)]
-    found = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    found = command.figures("render", *options)
     return Row(what, found["seconds_per_frame"], found["peak_rss_gb"], found["picture"])
 
 
 def _whole(config: Path) -> Row:
     """All stages of a config, from nothing to its frames."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "pipeline", "run", str(config), "--outputs", folder]
-        start = time.perf_counter()
-        subprocess.run(command, check=True, capture_output=True)
-        seconds = time.perf_counter() - start
-        log = next(Path(folder).rglob("log.jsonl"))
-        events = [json.loads(line) for line in log.read_text().splitlines()]
-    peak = max(event["peak_gb"] for event in events if event["event"] == "end")
-    return Row(f"{config.name}, all stages", round(seconds, 1), peak, "")
+    run = command.timed("run", config)
+    return Row(f"{config.name}, all stages", round(run.seconds, 1), run.peak_gb, "")

@@ -30,11 +30,12 @@ def bench(
     hair: Literal["none", "grid", "capsule"] = "none",
     falling: bool = False,
     torsion: Literal["none", "frenet", "rotor", "kirchhoff"] = "rotor",
+    still: bool = False,
     repeats: int = _REPEATS,
 ) -> dict[str, float]:
     """Step hair of 25 cm at dt = 1/240 s with the stage's own stepper.
 
-    Waves that have settled on a shaking head, medians over repeats; or, `falling`, a second of curls that stand on a
+    Waves that have settled on a shaking head, or `still` on one at rest, medians over repeats; or, `falling`, a second of curls that stand on a
     head and fall onto one another. `hair` is the method of hair-hair contact. Returns ns_per_point_step,
     frames_per_second (10 steps a frame), threads, and hair_ms_per_step, the part of hair-hair contact. For "rotor" also
     the operations of a step and what part of the machine's peak they make.
@@ -51,7 +52,8 @@ def bench(
         )
         simulation = Simulation(simulate, seed=1, guides=curly_head(guides, points))
         return _figures(simulation, _timed(simulation, simulate.frames) / simulate.frames, threads)
-    motion = Motion(preset="shake", period=1.0, swings=1000, amplitude=0.3, pivot=(0.0, 0.0, 0.0))
+    preset: Literal["none", "shake"] = "none" if still else "shake"
+    motion = Motion(preset=preset, period=1.0, swings=1000, amplitude=0.3, pivot=(0.0, 0.0, 0.0))
     simulate = Simulate(
         precision=precision,
         motion=motion,

@@ -48,6 +48,7 @@ Outputs = Annotated[Path, Parameter(help="Folder that holds a folder for each ex
 Json = Annotated[
     bool, Parameter(name="--json", negative="", show_default=False, help="Print one JSON object.")
 ]
+Flag = Parameter(negative="", show_default=False)
 ConfigFile = Annotated[Path, Parameter(help="A config, such as configs/default.toml.")]
 
 
@@ -139,3 +140,26 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def print_figures(figures: dict[str, Any], json: bool) -> None:
+    """Print figures, one a line, or as JSON."""
+    if json:
+        print_json(figures)
+        return
+    for name, value in figures.items():
+        print(f"{name:<22} {value:.4g}" if isinstance(value, float) else f"{name:<22} {value}")
+
+
+def print_table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> None:
+    """Print these columns of rows, aligned."""
+    cells = [columns] + [tuple(_cell(row[name]) for name in columns) for row in rows]
+    widths = [max(len(row[index]) for row in cells) for index in range(len(columns))]
+    for row in cells:
+        print("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "NO"
+    return f"{value:.5g}" if isinstance(value, float) else str(value)

@@ -10,6 +10,7 @@ from cyclopts import CycloptsError
 
 from pipeline import log
 from pipeline.cli import (  # noqa: F401, they add their commands
+    bench_commands,
     check_commands,
     compare_commands,
     completion,

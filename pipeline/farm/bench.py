@@ -51,7 +51,7 @@ def bench(frames: int, workers: int, size: int, strands: int) -> dict[str, Any]:
     config = Config(
         name="farm",
         groom=Groom(strands=strands, guides=32),
-        simulate=Simulate(frames=frames, settle=0.1),
+        simulate=Simulate(frames=max(frames, len(_first(workers))), settle=0.1),
         render=Render(size=(size, size)),
     )
     folder = Path(tempfile.mkdtemp(prefix="ringlet-farm-"))
@@ -71,7 +71,7 @@ def _measured(batch: Batch, frames: int, workers: int) -> dict[str, Any]:
     start = time.perf_counter()
     one = _alone(batch, here, frames, {})
     held = _alone(batch, here[:threads], part, environment(threads))
-    together = _together(batch, workers)
+    together = _together(batch, workers, frames)
     return {
         "frames": frames,
         "workers": workers,
@@ -92,7 +92,12 @@ def _measured(batch: Batch, frames: int, workers: int) -> dict[str, Any]:
     }
 
 
-def _together(batch: Batch, workers: int) -> Spent:
+def _first(workers: int) -> range:
+    """Frames that are drawn before the clock starts."""
+    return range(1, 2 * workers + 1)
+
+
+def _together(batch: Batch, workers: int, frames: int) -> Spent:
     start = time.perf_counter()
     with local_cluster(workers) as address, connected(address) as client:
 
@@ -100,10 +105,10 @@ def _together(batch: Batch, workers: int) -> Spent:
             workers: dict[str, float] = client.run(time.process_time)
             return time.process_time() + sum(workers.values())
 
-        make_on(address, [batch], frames=range(1, 2 * workers + 1))
+        make_on(address, [batch], frames=_first(workers))
         shutil.rmtree(batch.experiment.frames)
         began, before = time.perf_counter(), processor()
-        report = make_on(address, [batch])
+        report = make_on(address, [batch], frames=range(1, frames + 1))
         spent = Spent(time.perf_counter() - began, processor() - before, report.seconds, began - start)
     shutil.rmtree(batch.experiment.frames)
     return spent
@@ -124,7 +129,7 @@ def _draw(job: Job, threads: int, frames: int) -> Spent:
     kernels.set_threads(threads)
     with log.forwarded_to(lambda _record: None):
         batch = job.batch()
-        batch.make("render", range(1, 3))
+        batch.make("render", _first(1))
         shutil.rmtree(batch.experiment.frames)
         start, before = time.perf_counter(), time.process_time()
         batch.make("render", range(1, frames + 1))

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 ATTEMPTS = 10  # workers that may die over one task before it is given up
 _CONNECT_S = 10
+_PRELOAD = "pipeline.farm.interrupts"
 
 
 def need_distributed() -> None:
@@ -36,12 +37,23 @@ def share(workers: int) -> int:
     return max(1, processors() // workers)
 
 
+def quiet() -> None:
+    """What Dask and what is below it tell, we tell in one line."""
+    for name in ("distributed", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
 def settings(threads: int) -> dict[str, Any]:
     """Of Dask, for workers of so many threads and what is around them: the processors are left to the tasks.
 
     Its watching of itself many times a second took 10 % of a processor where frames are drawn by two workers (measured).
     """
+    import dask.config
+    import distributed.config  # noqa: F401, which knows what is not set here
+
+    already = dask.config.get("distributed.worker.preload")
     return {
+        "distributed.worker.preload": [*([already] if isinstance(already, str) else already), _PRELOAD],
         "distributed.nanny.pre-spawn-environ": environment(threads),
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
@@ -69,19 +81,21 @@ def local_cluster(workers: int) -> Iterator[str]:
     """Start a scheduler and workers that share the processors of this machine; lends the scheduler's address."""
     need_distributed()
     import dask
-    import distributed.config  # noqa: F401, which knows what is not set here
     from distributed import LocalCluster
 
     if workers < 1:
         raise InputError(f"--workers {workers}: expected a number above 0")
+    quiet()
+    attempts = {"distributed.scheduler.allowed-failures": ATTEMPTS}
     with (
-        dask.config.set(settings(share(workers)) | {"distributed.scheduler.allowed-failures": ATTEMPTS}),
+        dask.config.set(settings(share(workers)) | attempts),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             memory_limit=0,  # the planner has refused what does not fit
             host="127.0.0.1",
-            dashboard_address=None,
+            scheduler_kwargs={"dashboard": False},
+            dashboard_address="127.0.0.1:0",  # of its pages for machines, any port that is free
             silence_logs=logging.CRITICAL,
         ) as cluster,
     ):
@@ -94,7 +108,7 @@ def connected(address: str) -> Iterator["Client"]:
     need_distributed()
     from distributed import Client
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it tells, we tell in one line
+    quiet()
     try:
         client = Client(address, timeout=_CONNECT_S, set_as_default=False)
     except ValueError as error:

@@ -5,7 +5,7 @@ import logging
 import time
 
 from pipeline.errors import InputError
-from pipeline.farm.cluster import need_distributed, processors, settings
+from pipeline.farm.cluster import need_distributed, processors, quiet, settings
 from pipeline.progress import say
 
 _AGAIN_S = 1.0
@@ -22,7 +22,7 @@ def serve(address: str, threads: int | None, patience: float) -> None:
     import dask
 
     threads = threads or processors()
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    quiet()
     served, last = False, time.monotonic()
     with dask.config.set(settings(threads) | {"distributed.comm.timeouts.connect": f"{_CONNECT_S}s"}):
         while time.monotonic() - last < patience:
