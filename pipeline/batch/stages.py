@@ -11,12 +11,6 @@ from pipeline import cache, log
 from pipeline.config import STAGES, Config, explain, stage_inputs, stage_keys
 from pipeline.progress import say
 
-NEEDS = {
-    "groom": (),
-    "simulate": ("groom",),
-    "interpolate": ("groom",),
-    "render": ("groom", "simulate", "interpolate"),
-}
 _KINDS = {"groom": "groom", "simulate": "guides", "interpolate": "strands"}
 _REASONS_SHOWN = 3
 _CHANGES_SHOWN = 6

@@ -165,9 +165,9 @@ def _make(
 
     log.use(manner.log_format)
     refuse_bare_start()  # before anything large is loaded
-    from pipeline.batch.stages import NEEDS, Batch
+    from pipeline.batch.stages import Batch
     from pipeline.cache import where_writable
-    from pipeline.config import STAGES
+    from pipeline.config import NEEDS, STAGES
     from pipeline.report import write_run_page
 
     if stage not in STAGES:

@@ -44,12 +44,13 @@ _READS: dict[str, tuple[str, ...]] = {
         "render",
     ),
 }
-_UPSTREAM: dict[str, tuple[str, ...]] = {
+NEEDS: dict[str, tuple[str, ...]] = {
     "groom": (),
     "simulate": ("groom",),
     "interpolate": ("groom",),
     "render": ("groom", "simulate", "interpolate"),
 }
+"""The stages whose files each stage reads."""
 _NOT_SOURCES = (".pyc", ".pyi", ".so")
 _SETTLED_S = 2.0
 _SHARED_CODE = ("kernels", "strands", "body", "cache")
@@ -70,7 +71,7 @@ def stage_inputs(config: Config) -> dict[str, Inputs]:
     stages: dict[str, Inputs] = {}
     for stage in STAGES:
         inputs: Inputs = {key: value for key, value in flat.items() if _reads(stage, key)}
-        inputs |= {f"stage {name}": _digest(stages[name]) for name in _UPSTREAM[stage]}
+        inputs |= {f"stage {name}": _digest(stages[name]) for name in NEEDS[stage]}
         stages[stage] = inputs | {"code": code_version(stage)}
     return stages
 

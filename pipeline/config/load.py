@@ -22,9 +22,8 @@ from pipeline.config.tree import KeyPath, Tree, dotted, parse_key
 from pipeline.config.usd_layers import layers_of
 from pipeline.errors import InputError
 
-FILES: dict[
-    tuple[str, ...], tuple[str, ...]
-] = {  # keys that name a file ("*" is any), and the words that do not
+# Keys that name a file ("*" is any), and the words that do not
+FILES: dict[tuple[str, ...], tuple[str, ...]] = {
     ("scene", "head"): ("builtin", "none"),
     ("groom", "source"): ("procedural", "swatch"),
     ("groom", "pins"): (),

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pipeline.batch.stages import NEEDS
-from pipeline.config import STAGES, Config
+from pipeline.config import NEEDS, STAGES, Config
 
 FRAMES_PER_TASK = 8
 

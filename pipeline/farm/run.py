@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline import log
-from pipeline.batch.stages import NEEDS, Batch
+from pipeline.batch.stages import Batch
 from pipeline.cache import Experiment
-from pipeline.config import STAGES
+from pipeline.config import NEEDS, STAGES
 from pipeline.errors import InputError
 from pipeline.farm import tasks
 from pipeline.farm.cluster import ATTEMPTS, connected, local_cluster, need_distributed

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline import kernels, log
-from pipeline.batch.stages import NEEDS, Batch, identity
+from pipeline.batch.stages import Batch, identity
 from pipeline.cache import Experiment
-from pipeline.config import Config
+from pipeline.config import NEEDS, Config
 from pipeline.errors import FAULT, InputError, verdict
 
 if TYPE_CHECKING:

@@ -1,6 +1,9 @@
 """The report of the error that guides and interpolation make: its measures, its floors and who wins."""
 
+import re
 from functools import cache
+from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +12,10 @@ from named_strands import helix
 from pipeline.validation.interpolation import Plan, Report, measure, merged
 from pipeline.validation.interpolation.forces import in_equilibrium
 from pipeline.validation.interpolation.grooms import HEAD, KINDS, LENGTH, groom, round_head
-from pipeline.validation.interpolation.measures import distance, error
+from pipeline.validation.interpolation.measures import Error, distance, error
 from pipeline.validation.interpolation.methods import Following, turns
+from pipeline.validation.interpolation.page import write_page
+from pipeline.validation.interpolation.report import CHOICES, METHODS, OURS, Floor, Row
 from pipeline.validation.interpolation.scene import scene
 
 CURLY = next(kind for kind in KINDS if kind.name == "curly")
@@ -111,3 +116,33 @@ def test_without_hair_on_hair_guides_alone_move_as_among_all() -> None:
     where = scene(CURLY, 24, "none")
     alone, among = where.moved(np.arange(8)), where.moved(np.arange(24))
     assert all(np.array_equal(a.points, b.points[:8]) for a, b in zip(alone, among, strict=True))
+
+
+def made_up() -> Report:
+    """A report whose errors all differ, so that each figure of the page has one place."""
+    plan = Plan(KINDS[:2], 120, (15, 60), (60,))
+    cases = [
+        (hair, choice, OURS) for hair, choice in (("none", "ours"), ("none", "random"), ("grid", "ours"))
+    ]
+    wanted = [(*case, count) for case, count in product(cases, plan.guides)]
+    wanted += [("none", "ours", method, 60) for method in METHODS if method != OURS]
+    rows, figure = [], 1.0
+    for kind, (hair, choice, method, count) in product(plan.kinds, wanted):
+        figure += 0.01
+        rows.append(Row(kind.name, hair, count, choice, method, Error(figure / 100, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    return Report(plan, tuple(rows), tuple(Floor(kind.name, 0.5, 0.0, 0.0) for kind in plan.kinds))
+
+
+def test_the_page_has_every_figure_and_the_pictures_that_it_shows(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    found = made_up()
+    write_page(found, tmp_path / "docs" / "error.md", quick=True)
+    page = (tmp_path / "docs" / "error.md").read_text()
+    in_both_tables = found.find(hair_on_hair="none", choice="ours", guides=60, method=OURS)
+    for row in found.rows:
+        assert page.count(f"| {100 * row.error.mean:.2f} |") == 1 + (row in in_both_tables), row
+    assert {row.choice for row in found.rows} == set(CHOICES)
+    shown = re.findall(r"\((pictures/.*?)\)", page)
+    assert len(shown) == 2
+    for name in shown:
+        assert (tmp_path / "docs" / name).read_bytes().startswith(b"\x89PNG")
