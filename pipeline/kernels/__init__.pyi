@@ -724,13 +724,17 @@ class Shadows:
 class FibreTables:
     """Scattering of one fibre, tabulated; see `pipeline.render.fibre`."""
 
-    def __init__(self, lobes: _F32, sums: _F32, variance: _F32, tilt: _F32, absorption_max: float) -> None:
+    def __init__(
+        self, lobes: _F32, sums: _F32, pigment: _F32, variance: _F32, tilt: _F32, absorption_max: float
+    ) -> None:
         """The tables, held and not copied.
 
         Args:
             lobes: (A, T, H, 8) float32 over absorption (uniform in its root), theta_d in [0, pi/2], phi in [0, pi]:
                 N_R, N_TT, N_TRT, N_rest [1/rad], their means over a half circle G_R, G_TT, G_TRT + G_rest, 0.
             sums: (A, T, 8) float32: a_f, a_b, mean of N over the circle for R, TT, TRT + rest, v_f, v_b, 0.
+            pigment: (K, J, 4) float32 over the place from root to tip and variation u in [0, 1]: absorption R, G, B
+                [1/radius], factor on the variances.
             variance: (4,) float32, v of the four lobes.
             tilt: (4,) float32 [rad], shift of theta_o in the four lobes.
             absorption_max: [1/radius], absorption at the last level.
@@ -765,7 +769,7 @@ class Illumination:
 
 def shade(
     points: _F32,
-    absorption: _F32,
+    variation: _F32,
     key: NDArray[np.uint32],
     eye: _F64,
     light: Illumination,
@@ -776,7 +780,8 @@ def shade(
 
     Args:
         points: (S, P, 3) float32 [m], root first.
-        absorption: (S, 3) float32 [1/radius], sigma_a for R, G, B.
+        variation: (S, 3) float32, how each strand differs: u in [0, 1] and a factor on the variances, see `FibreTables`,
+            and what is added to the place on it, of its length.
         key: (S,) uint32, random key of each strand.
         eye: (3,) float64 [m].
         light: lights and sky.
@@ -928,8 +933,8 @@ class Raster:
     def cut_off(self, backdrop: Backdrop) -> None:
         """End counting: hair behind enough hair, or behind the backdrop, is not looked at."""
 
-    def add(self, points: _F32, widths: _F32, absorption: _F32, key: NDArray[np.uint32]) -> None:
-        """Add strands (S, P, 3) [m] with widths (S, P) [m], absorption (S, 3) and random keys (S,).
+    def add(self, points: _F32, widths: _F32, variation: _F32, key: NDArray[np.uint32]) -> None:
+        """Add strands (S, P, 3) [m] with widths (S, P) [m], variations (S, 3) and random keys (S,).
 
         What may be seen of them is copied.
         """

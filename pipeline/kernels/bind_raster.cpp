@@ -69,15 +69,15 @@ static void cut_off(Raster &raster, const HeldBackdrop &back) {
     raster.cut_off(back, threads());
 }
 
-static void add(Raster &raster, Points points, Widths widths, Array<const float, -1, 3> absorption, Array<const uint32_t, -1> key) {
+static void add(Raster &raster, Points points, Widths widths, Array<const float, -1, 3> variation, Array<const uint32_t, -1> key) {
     fits(points, widths);
     const size_t S = points.shape(0), P = points.shape(1);
-    require(absorption.shape(0) == S && key.shape(0) == S, "Raster.add: absorption and key do not fit points");
+    require(variation.shape(0) == S && key.shape(0) == S, "Raster.add: variation and key do not fit points");
     require(!raster.bins.cut.empty(), "Raster.add: before cut_off");
     require(raster.bins.batches.empty() || raster.bins.P == int(P), "Raster.add: another number of points than before");
     require(raster.bins.batches.size() + S / Bins::strands_per_batch(int(P)) < 1u << (32 - Batch::kBits), "Raster.add: too many strands");
     nb::gil_scoped_release release;
-    raster.bins.add(raster.view, {points.data(), widths.data(), absorption.data(), key.data(), int(S), int(P)}, threads());
+    raster.bins.add(raster.view, {points.data(), widths.data(), variation.data(), key.data(), int(S), int(P)}, threads());
 }
 
 static int compose(Raster &raster, const HeldBackdrop &back, const PointShader &shader, Picture picture,
@@ -107,7 +107,7 @@ void bind_raster(nb::module_ &m) {
         .def("begin", &begin, nb::arg("matrix"), nb::arg("scale"), nb::arg("planes"))
         .def("count", &count, nb::arg("points"), nb::arg("widths"), nb::arg("first"))
         .def("cut_off", &cut_off, nb::arg("backdrop"))
-        .def("add", &add, nb::arg("points"), nb::arg("widths"), nb::arg("absorption"), nb::arg("key"))
+        .def("add", &add, nb::arg("points"), nb::arg("widths"), nb::arg("variation"), nb::arg("key"))
         .def("compose", &compose, nb::arg("backdrop"), nb::arg("shader"), nb::arg("picture"), nb::arg("names") = nb::none())
         .def_ro("shaded", &Raster::shaded);
 }

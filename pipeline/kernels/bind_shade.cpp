@@ -25,24 +25,25 @@ using Radiance = nb::ndarray<nb::numpy, float>;
 struct HeldTables : FibreTables {
     Records lobe_array;
     Array<const float, -1, -1, 8> sum_array;
+    Array<const float, -1, -1, 4> pigment_array;
 };
 
-static void make_tables(HeldTables *held, Records lobes, Array<const float, -1, -1, 8> sums, Array<const float, 4> variance,
-                        Array<const float, 4> tilt, float absorption_max) {
+static void make_tables(HeldTables *held, Records lobes, Array<const float, -1, -1, 8> sums, Array<const float, -1, -1, 4> pigment,
+                        Array<const float, 4> variance, Array<const float, 4> tilt, float absorption_max) {
     for (int axis = 0; axis < 3; ++axis) require(lobes.shape(axis) >= 2, "FibreTables: expected 2 or more entries along each axis");
     require(sums.shape(0) == lobes.shape(0) && sums.shape(1) == lobes.shape(1), "FibreTables: sums do not fit lobes");
+    require(pigment.shape(0) >= 2 && pigment.shape(1) >= 2, "FibreTables: expected a pigment of 2 or more entries along each axis");
     require(absorption_max > 0, "FibreTables: expected a positive absorption_max");
     FibreTables tables{};
     tables.lobes = lobes.data(), tables.sums = sums.data(), tables.absorption_max = absorption_max;
+    tables.pigment = pigment.data(), tables.K = int(pigment.shape(0)), tables.J = int(pigment.shape(1));
     tables.A = int(lobes.shape(0)), tables.T = int(lobes.shape(1)), tables.H = int(lobes.shape(2));
     for (int p = 0; p < 4; ++p) {
         require(variance.data()[p] > 0, "FibreTables: expected positive variances");
         tables.variance[p] = variance.data()[p];
-        const Lobe lobe(splat(tables.variance[p]));
-        tables.inverse[p] = lobe.inverse[0], tables.norm[p] = lobe.norm[0];
         tables.tilt_cosine[p] = std::cos(tilt.data()[p]), tables.tilt_sine[p] = std::sin(tilt.data()[p]);
     }
-    new (held) HeldTables{tables, lobes, sums};
+    new (held) HeldTables{tables, lobes, sums, pigment};
 }
 
 /// The light with the arrays that it points into.
@@ -69,16 +70,16 @@ static void make_light(HeldLight *held, Triples directions, Triples irradiance, 
     new (held) HeldLight{light, directions, irradiance, sky, surroundings, shadows};
 }
 
-static Radiance shade_strands(Strands points, Triples absorption, Array<const uint32_t, -1> key, Point eye,
+static Radiance shade_strands(Strands points, Triples variation, Array<const uint32_t, -1> key, Point eye,
                               const HeldLight &light, const HeldTables &tables,
                               std::optional<Array<const uint32_t, -1>> which) {
     const size_t S = points.shape(0), P = points.shape(1);
     require(P >= 2, "shade: expected 2 or more points");
-    require(absorption.shape(0) == S && key.shape(0) == S, "shade: absorption and key do not fit points");
+    require(variation.shape(0) == S && key.shape(0) == S, "shade: variation and key do not fit points");
     const size_t count = which ? which->shape(0) : S * P;
     for (size_t i = 0; which && i < count; ++i) require(which->data()[i] < S * P, "shade: which has a point beyond the last one");
     auto radiance = new_array<float>({count, size_t(3)});
-    const StrandPoints strands{points.data(), absorption.data(), key.data(), which ? which->data() : nullptr, int(P)};
+    const StrandPoints strands{points.data(), variation.data(), key.data(), which ? which->data() : nullptr, int(P)};
     float *out = radiance.data();
     nb::gil_scoped_release release;
     FibreShader(light, tables, eye.data()).shade(strands, count, out, threads());
@@ -114,8 +115,8 @@ static Radiance shade_head(const HeldSurface &surface, Point eye, const HeldLigh
 
 void bind_shade(nb::module_ &m) {
     nb::class_<HeldTables>(m, "FibreTables")
-        .def("__init__", &make_tables, nb::arg("lobes"), nb::arg("sums"), nb::arg("variance"), nb::arg("tilt"),
-             nb::arg("absorption_max"));
+        .def("__init__", &make_tables, nb::arg("lobes"), nb::arg("sums"), nb::arg("pigment"), nb::arg("variance"),
+             nb::arg("tilt"), nb::arg("absorption_max"));
     nb::class_<HeldLight>(m, "Illumination")
         .def("__init__", &make_light, nb::arg("directions"), nb::arg("irradiance"), nb::arg("sky"), nb::arg("shadows"),
              nb::arg("surroundings"))
@@ -130,7 +131,7 @@ void bind_shade(nb::module_ &m) {
                  new (self) FibreShader(light, tables, eye.data());
              },
              nb::arg("light"), nb::arg("tables"), nb::arg("eye"), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
-    m.def("shade", &shade_strands, nb::arg("points"), nb::arg("absorption"), nb::arg("key"), nb::arg("eye"),
+    m.def("shade", &shade_strands, nb::arg("points"), nb::arg("variation"), nb::arg("key"), nb::arg("eye"),
           nb::arg("light"), nb::arg("tables"),
           nb::arg("which") = nb::none());
     m.def("shade_surface", &shade_head, nb::arg("surface"), nb::arg("eye"), nb::arg("light"), nb::arg("field").none(),

@@ -15,7 +15,7 @@ namespace ringlet {
 /// A chunk of strands: points (S, P, 3) [m], widths (S, P) [m], and what shading needs of each strand.
 struct StrandChunk {
     const float *points, *widths;
-    const float *absorption; // (S, 3)
+    const float *variation; // (S, 3)
     const uint32_t *key;     // (S,)
     int S, P;
 };
@@ -40,7 +40,7 @@ struct Batch {
 
     Span<SeenPoint> seen;
     std::vector<Entry> entries; // until they are sorted by blocks
-    Span<float> points, absorption; // (n, P, 3) and (n, 3) of the n strands of which something is seen
+    Span<float> points, variation; // (n, P, 3) and (n, 3) of the n strands of which something is seen
     Span<uint32_t> key;             // (n,)
 };
 
@@ -48,13 +48,13 @@ struct Batch {
 struct OpenBatch {
     std::vector<SeenPoint> seen;
     std::vector<Entry> entries;
-    std::vector<float> points, absorption;
+    std::vector<float> points, variation;
     std::vector<uint32_t> key;
 
-    void clear() { seen.clear(), entries.clear(), points.clear(), absorption.clear(), key.clear(); }
+    void clear() { seen.clear(), entries.clear(), points.clear(), variation.clear(), key.clear(); }
 
     Batch store(Arena &arena) const {
-        return {arena.copy(seen), std::vector<Entry>(entries), arena.copy(points), arena.copy(absorption), arena.copy(key)};
+        return {arena.copy(seen), std::vector<Entry>(entries), arena.copy(points), arena.copy(variation), arena.copy(key)};
     }
 };
 
@@ -134,7 +134,7 @@ struct Bins {
             }
             if (last < 0) return;
             batch.points.insert(batch.points.end(), points, points + 3 * P);
-            batch.absorption.insert(batch.absorption.end(), strands.absorption + 3 * size_t(s), strands.absorption + 3 * size_t(s) + 3);
+            batch.variation.insert(batch.variation.end(), strands.variation + 3 * size_t(s), strands.variation + 3 * size_t(s) + 3);
             batch.key.push_back(strands.key[s]);
         }
 

@@ -1,7 +1,8 @@
 // One hair fibre seen from afar: S = sum over the lobes R, TT, TRT and rest of M_p (along) N_p (around).
 //
 // M_p(theta_i, theta_o) = exp(-sin ti sin to / v) I0(cos ti cos to / v) / (2 v sinh(1/v)): d'Eon et al., An
-// Energy-Conserving Hair Reflectance Model, EGSR 2011. N_p and its sums come from tables (pipeline/render/fibre.py).
+// Energy-Conserving Hair Reflectance Model, EGSR 2011. N_p and its sums come from tables (pipeline/render/fibre.py), and
+// so do colour and roughness along a strand (pipeline/render/pigment.py).
 #pragma once
 
 #include "elementary.hpp"
@@ -17,16 +18,16 @@ typedef float Eight __attribute__((vector_size(32)));
 struct Lobe {
     Floats inverse, norm; // 1 / v and 1 / (v (1 - e^(-2/v)))
 
-    RINGLET_INLINE Lobe(float inverse, float norm) : inverse(splat(inverse)), norm(splat(norm)) {}
+    Lobe() = default;
     RINGLET_INLINE explicit Lobe(Floats v) : inverse(1.0f / v), norm(inverse / (1.0f - exponential(-2.0f * inverse))) {}
 };
 
 struct FibreTables {
     const float *lobes; // (A, T, H, 8): N_R, N_TT, N_TRT, N_rest, G_R, G_TT, G_TRT + G_rest, 0
     const float *sums;  // (A, T, 8): a_f, a_b, circle means of N for R, TT, TRT + rest, v_f, v_b, 0
-    int A, T, H;
+    const float *pigment; // (K, J, 4): absorption R, G, B [1/radius], variance over `variance`; from root to tip, and by u
+    int A, T, H, K, J;
     float variance[4], absorption_max;
-    float inverse[4], norm[4];          // of each variance, see Lobe
     float tilt_cosine[4], tilt_sine[4]; // of the shift of theta_o in each lobe
 };
 
@@ -104,15 +105,27 @@ RINGLET_INLINE void read_lobes(const FibreTables &tables, const Place &level, co
     read<Eight>(tables.lobes, level, theta, phi, stride, entries);
 }
 
-/// Entries of `sums` for 16 points: linear in absorption and theta_d.
-RINGLET_INLINE void read_sums(const FibreTables &tables, const Place &level, const Place &theta, Floats entries[8]) {
-    Eight records[16];
+/// Records of a table (.., `across`, n), linear between 4 neighbours, for 16 points.
+template <class Record>
+RINGLET_INLINE void read(const float *table, int across, const Place &x, const Place &y, Floats *entries) {
+    constexpr int n = sizeof(Record) / 4;
+    Record records[16];
     for (int i = 0; i < 16; ++i) {
-        const float *at = tables.sums + 8 * (level.at[i] * size_t(tables.T) + theta.at[i]);
-        const auto edge = [&](const float *from) { return mean(load<Eight>(from), load<Eight>(from + 8), theta.part[i]); };
-        records[i] = mean(edge(at), edge(at + 8 * tables.T), level.part[i]);
+        const float *at = table + n * (x.at[i] * size_t(across) + y.at[i]);
+        const auto edge = [&](const float *from) { return mean(load<Record>(from), load<Record>(from + n), y.part[i]); };
+        records[i] = mean(edge(at), edge(at + n * across), x.part[i]);
     }
     transpose(records, entries);
+}
+
+/// Entries of `sums` for 16 points: linear in absorption and theta_d.
+RINGLET_INLINE void read_sums(const FibreTables &tables, const Place &level, const Place &theta, Floats entries[8]) {
+    read<Eight>(tables.sums, tables.T, level, theta, entries);
+}
+
+/// Entries of `pigment` for 16 points: linear along the strand (0 .. 1) and in u (0 .. 1).
+RINGLET_INLINE void read_pigment(const FibreTables &tables, Floats along, Floats u, Floats entries[4]) {
+    read<Four>(tables.pigment, tables.J, Place(along * float(tables.K - 1), tables.K), Place(u * float(tables.J - 1), tables.J), entries);
 }
 
 } // namespace ringlet

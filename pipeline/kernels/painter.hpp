@@ -131,7 +131,7 @@ class Painter {
         for (const uint32_t number : unshaded_) {
             const Batch &batch = bins_.batch(number);
             const uint32_t point = bins_.seen(number)->number & ~SeenPoint::kKnown, strand = point / uint32_t(bins_.P);
-            to_shade_.push_back({batch.points.data + size_t(strand) * bins_.P * 3, batch.absorption.data + 3 * size_t(strand),
+            to_shade_.push_back({batch.points.data + size_t(strand) * bins_.P * 3, batch.variation.data + 3 * size_t(strand),
                                  batch.key[strand], int(point - strand * uint32_t(bins_.P))});
         }
         shaded += to_shade_.size();

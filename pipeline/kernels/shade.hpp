@@ -20,14 +20,14 @@ namespace ringlet {
 
 struct StrandPoints {
     const float *points;     // (S, P, 3)
-    const float *absorption; // (S, 3)
-    const uint32_t *key;     // (S,)
-    const uint32_t *which;   // (count,) points that are shaded; null: all of them
+    const float *variation; // (S, 3)
+    const uint32_t *key;    // (S,)
+    const uint32_t *which;  // (count,) points that are shaded; null: all of them
     int P;
 
     StrandPoint operator[](size_t k) const {
         const size_t index = which ? which[k] : k, s = index / P;
-        return {points + 3 * s * P, absorption + 3 * s, key[s], int(index - s * P)};
+        return {points + 3 * s * P, variation + 3 * s, key[s], int(index - s * P)};
     }
 };
 
@@ -36,6 +36,8 @@ struct FibrePoints {
     Vec3<float> x, at, tangent, to_eye; // x in voxels; at [m] from the middle of the shadow maps
     Floats sine, cosine, theta;     // of theta_o
     Floats level[3];                // absorption in entries of the tables
+    Floats rough;                   // variance of the lobes over that of the tables
+    Lobe lobes[4];
     Floats albedo[3];               // a_f + a_b across the fibre
     Words patch;                    // hash of 4 mm of its strand
 };
@@ -43,9 +45,26 @@ struct FibrePoints {
 constexpr float kPi = 3.14159265f;
 constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
 
+/// Colour and roughness of points at a place along their strands (0 .. 1) that differ from others by u (0 .. 1) in colour
+/// and by a factor in the variance of their lobes.
+inline void read_colour(const FibreTables &tables, Floats along, Floats u, Floats rougher, FibrePoints &p) {
+    Floats entries[4];
+    read_pigment(tables, along, u, entries);
+    p.rough = rougher * entries[3];
+    for (int q = 0; q < 4; ++q) p.lobes[q] = Lobe(p.rough * tables.variance[q]);
+    const float scale = (tables.A - 1) / std::sqrt(tables.absorption_max);
+    for (int c = 0; c < 3; ++c) {
+        p.level[c] = square_root<float>(maximum<float>(entries[c], splat(0.0f))) * scale;
+        Floats sums[8];
+        read_sums(tables, Place(p.level[c], tables.A), Place(splat(0.0f), tables.T), sums);
+        p.albedo[c] = sums[0] + sums[1];
+    }
+}
+
 /// Reads 16 points of strands of P points.
-inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (&eye)[3], const Illumination &light) {
-    float position[3][16], tangent[3][16], sigma[3][16];
+inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (&eye)[3], const Illumination &light,
+                          const FibreTables &tables) {
+    float position[3][16], tangent[3][16], own[3][16], along[16];
     uint32_t patch[16];
     for (int i = 0; i < 16; ++i) {
         const int j = points[i].j;
@@ -55,9 +74,10 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
         for (int c = 0; c < 3; ++c) {
             position[c][i] = at[c];
             tangent[c][i] = after[c] - before[c];
-            sigma[c][i] = points[i].absorption[c];
+            own[c][i] = points[i].variation[c];
             spacing += (root[3 + c] - root[c]) * (root[3 + c] - root[c]);
         }
+        along[i] = float(j) / float(P - 1);
         const uint32_t key = mix(points[i].key);
         // The first segment is held, so its length is the same in every frame and patches do not crawl
         const float patches = std::min(j * std::sqrt(spacing) / kPatch + float(key >> 8) * 0x1p-24f, 1e6f);
@@ -67,7 +87,6 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     Vec3<float> x;
     __builtin_memcpy(&x, position, sizeof x);
     __builtin_memcpy(&p.tangent, tangent, sizeof p.tangent);
-    __builtin_memcpy(p.level, sigma, sizeof sigma);
     __builtin_memcpy(&p.patch, patch, sizeof patch);
     const auto unit = [](Vec3<float> a) { return (1.0f / square_root<float>(dot(a, a) + 1e-30f)) * a; };
     p.tangent = unit(p.tangent);
@@ -78,6 +97,10 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
     p.cosine = square_root<float>(maximum<float>(1.0f - p.sine * p.sine, splat(1e-6f)));
     p.theta = 0.5f * kPi - arc_cosine(p.sine);
+    Floats differs[3], place;
+    __builtin_memcpy(differs, own, sizeof own);
+    __builtin_memcpy(&place, along, sizeof along);
+    read_colour(tables, place + differs[2], differs[0], differs[1], p);
     return p;
 }
 
@@ -95,8 +118,8 @@ RINGLET_INLINE Flux two_flux(Floats a_f, Floats a_b, Floats n, Floats behind) {
 }
 
 /// M of the lobes R, TT and TRT + rest, widened by the light's spread.
-RINGLET_INLINE void widened(const FibreTables &tables, Floats spread, Floats cosines, Floats sines, Floats M[3]) {
-    for (int p = 0; p < 3; ++p) M[p] = along(cosines, sines, Lobe(tables.variance[p] + spread));
+RINGLET_INLINE void widened(const FibreTables &tables, Floats rough, Floats spread, Floats cosines, Floats sines, Floats M[3]) {
+    for (int p = 0; p < 3; ++p) M[p] = along(cosines, sines, Lobe(rough * tables.variance[p] + spread));
 }
 
 /// What one light adds. noinline: the compiler keeps the 16 lanes in registers only in functions of this size.
@@ -123,15 +146,14 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     const Floats loss = square_root<float>(maximum<float>(g * g - a_b * a_b, splat(1e-6f)));
     const Floats cosines = cosine * p.cosine, sines = sine * p.sine;
     Floats direct[4], down[3], back[3];
-    widened(tables, minimum<float>(hits * sums[1][5], splat(2.0f)), cosines, sines, down);
-    widened(tables, minimum<float>(sums[1][6] + 2.0f * sums[1][5] / (g + loss), splat(2.0f)), cosines, sines, back);
+    widened(tables, p.rough, minimum<float>(p.rough * hits * sums[1][5], splat(2.0f)), cosines, sines, down);
+    widened(tables, p.rough, minimum<float>(p.rough * (sums[1][6] + 2.0f * sums[1][5] / (g + loss)), splat(2.0f)), cosines, sines, back);
 
     // The direct lobes, turned by the cuticle's scales
     for (int q = 0; q < 4; ++q) {
         const float ct = tables.tilt_cosine[q], st = tables.tilt_sine[q];
         const Floats turned = p.cosine * ct - p.sine * st;
-        direct[q] = along(cosine * (turned < 0.0f ? -turned : turned), sine * (p.sine * ct + p.cosine * st),
-                          Lobe(tables.inverse[q], tables.norm[q]));
+        direct[q] = along(cosine * (turned < 0.0f ? -turned : turned), sine * (p.sine * ct + p.cosine * st), p.lobes[q]);
     }
 
     const Floats through = exponential(-way.n);
@@ -150,20 +172,8 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     }
 }
 
-/// Absorption in entries of the tables, and the albedo of each channel.
-inline void read_colour(const FibreTables &tables, FibrePoints &p) {
-    const float scale = (tables.A - 1) / std::sqrt(tables.absorption_max);
-    for (int c = 0; c < 3; ++c) {
-        p.level[c] = square_root<float>(maximum<float>(p.level[c], splat(0.0f))) * scale;
-        Floats sums[8];
-        read_sums(tables, Place(p.level[c], tables.A), Place(splat(0.0f), tables.T), sums);
-        p.albedo[c] = sums[0] + sums[1];
-    }
-}
-
 /// Light of 16 points from everywhere.
 inline void light_block(FibrePoints &p, const Illumination &light, const FibreTables &tables, Floats radiance[3]) {
-    read_colour(tables, p);
     Floats around[8];
     read_surroundings(light, p.x, around);
     const Vec3<float> out{around[4], around[5], around[6]};
@@ -185,7 +195,7 @@ struct FibreShader : PointShader {
     template <class Points> void block(const Points &from, size_t first, size_t count, int P, float *radiance) const {
         StrandPoint points[16];
         for (size_t i = 0; i < 16; ++i) points[i] = from[std::min(first + i, count - 1)];
-        FibrePoints p = gather(points, P, eye, light);
+        FibrePoints p = gather(points, P, eye, light, tables);
         Floats sum[3];
         light_block(p, light, tables, sum);
         for (size_t i = 0; i < 16 && first + i < count; ++i)

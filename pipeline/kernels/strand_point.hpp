@@ -8,7 +8,7 @@ namespace ringlet {
 
 struct StrandPoint {
     const float *root;       // (P, 3) [m] the strand's points
-    const float *absorption; // (3,)
+    const float *variation; // (3,) how the strand differs from others; see pipeline/render/pigment.py
     uint32_t key;            // of the strand
     int j;                   // number of the point
 };

@@ -17,7 +17,7 @@ from pipeline.render.view import View
 
 Points = NDArray[np.float32]
 Chunk = tuple[Points, Points, Points, NDArray[np.uint32]]
-"""Points (S, P, 3) [m], widths (S, P) [m], absorption (S, 3), random keys (S,)."""
+"""Points (S, P, 3) [m], widths (S, P) [m], variation (S, 3), random keys (S,)."""
 Chunks = Callable[[], Iterable[Chunk]]
 
 _PARTS = (np.arange(256) / 255).astype(np.float32)
@@ -110,6 +110,6 @@ class Coverage:
 def _numbered(chunks: Chunks) -> Iterator[Chunk]:
     """The same strands, with their numbers, from 1, for keys."""
     first = 1
-    for points, widths, absorption, _ in chunks():
-        yield points, widths, absorption, np.arange(first, first + len(points), dtype=np.uint32)
+    for points, widths, variation, _ in chunks():
+        yield points, widths, variation, np.arange(first, first + len(points), dtype=np.uint32)
         first += len(points)

@@ -32,25 +32,16 @@ ABSORPTION_MAX: Final = 8.0
 """[1/radius] absorption at the last level: darker hair shows only its R lobe, as this does."""
 LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 24, 48, 140
 
-_EUMELANIN: Final = np.array([0.506, 0.841, 1.653])
-_PHEOMELANIN: Final = np.array([0.343, 0.733, 1.924])
+
+def variance(roughness: _F64 | float) -> _F64:
+    """Longitudinal variance v (...) of the lobe R (Chiang et al. 2016, eq. 7)."""
+    v: _F64 = np.square(0.726 * roughness + 0.812 * np.power(roughness, 2) + 3.7 * np.power(roughness, 20))
+    return v
 
 
-def absorption(melanin: _F32 | _F64 | float, redness: float) -> _F32:
-    """Absorption (..., 3) float32 [1/radius] for R, G, B of hair with this melanin (...), 0 .. 1.
-
-    Redness is the share of pheomelanin. Source: d'Eon et al. 2011 for the two spectra; the logarithm, which makes
-    equal steps of melanin look equal, is that of Cycles' principled hair.
-    """
-    amount = -np.log(np.maximum(1 - np.asarray(melanin, np.float64), 1e-4))
-    spectrum = (1 - redness) * _EUMELANIN + redness * _PHEOMELANIN
-    return (amount[..., None] * spectrum).astype(np.float32)
-
-
-def variance(roughness: float) -> _F64:
-    """Longitudinal variance v (4,) of the lobes (Chiang et al. 2016, eq. 7)."""
-    v = (0.726 * roughness + 0.812 * roughness**2 + 3.7 * roughness**20) ** 2
-    return v * np.array([1.0, 0.25, 4.0, 4.0])
+def variances(roughness: float) -> _F64:
+    """Longitudinal variances v (4,) of all lobes (Chiang et al. 2016, section 4.1)."""
+    return np.asarray(variance(roughness) * np.array([1.0, 0.25, 4.0, 4.0]))
 
 
 def scale(roughness: float) -> float:
@@ -150,14 +141,14 @@ class Scattering:
     def sums(self) -> _F64:
         """(A, T, 8): a_f, a_b, circle means of N for R, TT, TRT + rest, spreads v_f, v_b of forward and back, 0."""
         _, means = self.far_field
-        v = variance(self.roughness)[:, None, None]
+        v = variances(self.roughness)[:, None, None]
         back, forward = np.pi * means[..., 0], np.pi * means[..., -1]
         circle = (back + forward) / (2 * np.pi)
         a_f, a_b = forward.sum(0), back.sum(0)
         v_f, v_b = (v * forward).sum(0) / a_f, (v * back).sum(0) / a_b
         return np.stack([a_f, a_b, circle[0], circle[1], circle[2] + circle[3], v_f, v_b, 0 * a_f], axis=-1)
 
-    def loss(self, sigma: _F32) -> _F32:
+    def loss(self, sigma: _F32 | _F64) -> _F32:
         """Part k of the light that a fibre takes away for good, for absorption sigma (...): same shape, float32.
 
         k = sqrt((1 - a_f)^2 - a_b^2), the decay of diffuse light with the number of fibres; 0 for white hair.
@@ -165,8 +156,8 @@ class Scattering:
         a_f, a_b = (np.interp(np.sqrt(sigma), np.sqrt(self.levels), self.sums[:, 0, i]) for i in range(2))
         return np.sqrt(np.maximum((1 - a_f) ** 2 - a_b**2, 0)).astype(np.float32)
 
-    def tables(self) -> kernels.FibreTables:
-        """The tables as the shading kernel takes them."""
+    def tables(self, pigment: _F32) -> kernels.FibreTables:
+        """The tables as the shading kernel takes them, with a `pipeline.render.pigment.table` (K, J, 4)."""
         lobes, means = self.far_field
         record = [*lobes, means[0], means[1], means[2] + means[3], 0 * means[0]]
         # The cuticle's scales lean towards the tip: R turns to the tip, TT and TRT to the root
@@ -174,7 +165,8 @@ class Scattering:
         return kernels.FibreTables(
             np.ascontiguousarray(np.stack(record, axis=-1), np.float32),
             np.ascontiguousarray(self.sums, np.float32),
-            variance(self.roughness).astype(np.float32),
+            pigment,
+            variances(self.roughness).astype(np.float32),
             tilt.astype(np.float32),
             ABSORPTION_MAX,
         )

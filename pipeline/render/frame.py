@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline import kernels
 from pipeline.body.placement import Placement
 from pipeline.config.schema import Config
+from pipeline.render import pigment
 from pipeline.render.camera import CameraPath
 from pipeline.render.chunks import Chunks
 from pipeline.render.coverage import Chunk, Coverage
@@ -32,13 +33,11 @@ from pipeline.render.target import DECODED, Target, encode
 from pipeline.render.tone import CURVES, Pixels, average, develop
 from pipeline.render.view import Place, View
 from pipeline.strands.expand import Expansion, MovedSkin
-from pipeline.strands.random import normal
 
 Points = NDArray[np.float32]
 Linear = NDArray[np.float32]
 
 _MARGIN = 0.02  # [m] that strands may leave the bounds of their guides
-_MELANIN = 31  # salt
 _PIECE = 8192  # strands that OpenGL draws at once: it takes 20 times the memory of their points
 
 
@@ -102,9 +101,7 @@ class FrameRenderer:
         self.strands, self.key, self.skin = strands, key, skin
         self.count = min(render.strands or strands.count, strands.count)
         self.width = drawn_width(render, self.count, strands.count)
-        spread = np.clip(normal(config.seed, key, _MELANIN), -2, 2)
-        jitter = render.hair.melanin_jitter * spread
-        self.melanin = np.clip(render.hair.melanin + jitter, 0, 0.99).astype(np.float32)
+        self.variation = pigment.variation(render.hair, config.seed, key)
         self._now = _Lit(Chunks(strands, self.count), Lighting(scene, render.hair, render.grid))
         self._next = self._now.beside(strands, self.count)
         self._ahead = ThreadPoolExecutor(1, "light")
@@ -231,7 +228,7 @@ class FrameRenderer:
         for first, points in self._now.chunks:
             own = slice(first, first + len(points))
             fine = smooth(points, self.render.subdivide)
-            yield fine, self._own_widths(fine), self.lighting.absorption(self.melanin[own]), self.key[own]
+            yield fine, self._own_widths(fine), self.variation[own], self.key[own]
 
     def _own_widths(self, points: Points) -> NDArray[np.float32]:
         """Widths (S, P) [m] of strands (S, P, 3)."""
@@ -257,7 +254,7 @@ class FrameRenderer:
         wanted[:, :-1] |= segments
         wanted[:, 1:] |= segments
         which = np.flatnonzero(wanted).astype(np.uint32)
-        shade = partial(self.lighting.shade, shaded, self.melanin[own], self.key[own], eye)
+        shade = partial(self.lighting.shade, shaded, self.variation[own], self.key[own], eye)
         colours = np.zeros_like(points)
         colours.reshape(-1, 3)[which] = smooth_colours(shade, shaded.shape[1], pieces, which)
         if shape == "lines":

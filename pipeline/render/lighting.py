@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline import kernels
 from pipeline.config.schema import Fibre, Scene
-from pipeline.render import fibre
+from pipeline.render import fibre, pigment
 from pipeline.render.lights import as_directions
 from pipeline.render.veil import Veil
 from pipeline.strands.random import uniform
@@ -65,8 +65,14 @@ class Lighting:
         self._directions, self._irradiance = as_directions(scene.lights)
         self._sky = np.array(scene.environment, np.float32)
         scattering = fibre.Scattering(hair.roughness, hair.azimuthal_roughness, hair.tilt)
-        self._tables = scattering.tables()
-        self._loss = scattering.loss(fibre.absorption(hair.melanin, hair.redness))
+        colours = pigment.table(hair)
+        self._tables = scattering.tables(colours)
+        # Light that comes from everywhere has passed all of the strands
+        self._loss = (
+            scattering.loss(colours[:, colours.shape[1] // 2, :3])
+            .mean(axis=0, dtype=np.float64)
+            .astype(np.float32)
+        )
         self._grid: kernels.DensityGrid | None = None
         self._frame: _Shadowed | None = None
 
@@ -138,23 +144,18 @@ class Lighting:
         density = np.float32(wider) * frame.hair + np.float32(_OPAQUE) * frame.body
         return Veil(density, np.array(frame.light.origin), frame.light.spacing, eye)
 
-    def absorption(self, melanin: _F32) -> _F32:
-        """Absorption (S, 3) float32 [1/radius] of strands with melanin (S,)."""
-        return fibre.absorption(melanin, self._hair.redness)
-
     def shader(self, eye: _F64) -> kernels.FibreShader:
         """Return what shades points of strands as seen from `eye` (3,) float64 [m]."""
         return kernels.FibreShader(self._finished().light, self._tables, eye)
 
     def shade(
-        self, points: _F32, melanin: _F32, key: NDArray[np.uint32], eye: _F64, which: NDArray[np.uint32]
+        self, points: _F32, variation: _F32, key: NDArray[np.uint32], eye: _F64, which: NDArray[np.uint32]
     ) -> _F32:
         """Linear RGB (n, 3) float32, as seen from `eye` (3,), of points (n,), flat indices, of strands (S, P, 3).
 
-        The strands have melanin (S,) and random keys (S,).
+        The strands have variations (S, 3), see `pipeline.render.pigment`, and random keys (S,).
         """
-        absorption = self.absorption(melanin)
-        return kernels.shade(points, absorption, key, eye, self._finished().light, self._tables, which)
+        return kernels.shade(points, variation, key, eye, self._finished().light, self._tables, which)
 
     def shade_surface(
         self, points: _F32, normals: _F32, albedo: _F32, eye: _F64, curvature: _F32 | None = None

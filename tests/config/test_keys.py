@@ -45,6 +45,8 @@ def test_the_name_changes_no_key(tmp_path: Path) -> None:
         ("scene.camera.look_at=[0, 0, 0.1]", {"render"}),
         ("scene.background=[0, 0, 0]", {"render"}),
         ("render.hair.melanin=0.2", {"render"}),
+        ("render.hair.dye.colour=[0.1, 0.4, 0.9]", {"render"}),
+        ("render.hair.along=[{at=0, melanin=0.9}]", {"render"}),
         ("interpolate.strands=9000", {"interpolate", "render"}),
         ("simulate.theta=0.99", {"simulate", "render"}),
         ("simulate.motion.preset=nod", {"simulate", "render"}),

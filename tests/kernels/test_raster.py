@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import raster_twin as twin
 from numpy.typing import NDArray
+from own_colours import own_colours
 
 from pipeline import kernels
 
@@ -22,12 +23,14 @@ def backdrop(
     return kernels.Backdrop(np.array(np.broadcast_to(depth, shape), np.float32), samples, LINEAR, per_side)
 
 
-def shader() -> kernels.FibreShader:
-    """Fibres under a sky of radiance 1 that show the square root of their absorption."""
+def shader(colours: F32) -> kernels.FibreShader:
+    """Strands under a sky of radiance 1 that show the colours (S, P, 3) of their roots."""
     sums = np.zeros((2, 2, 8), np.float32)
     sums[1, :, 0] = 1
     flat = np.ones(4, np.float32)
-    tables = kernels.FibreTables(np.zeros((2, 2, 2, 8), np.float32), sums, flat, 0 * flat, 1.0)
+    tables = kernels.FibreTables(
+        np.zeros((2, 2, 2, 8), np.float32), sums, own_colours(colours[:, 0] ** 2)[0], flat, 0 * flat, 1.0
+    )
     none, around = np.zeros((0, 3), np.float32), np.ones((2, 2, 2, 8), np.float32)
     shadows = kernels.Shadows(none, -np.ones(3), np.ones(3), 0.5, 1e-3)
     light = kernels.Illumination(none, none, np.ones(3, np.float32), shadows, around)
@@ -41,8 +44,8 @@ def raster_of(size: tuple[int, int], layers: float = 20.0) -> kernels.Raster:
 
 
 def shown(colours: F32) -> tuple[F32, NDArray[np.uint32]]:
-    """Absorption (S, 3) and keys (S,) of strands that show the colours (S, P, 3) of their roots."""
-    return np.ascontiguousarray(colours[:, 0] ** 2), np.zeros(len(colours), np.uint32)
+    """Variation (S, 3) and keys (S,) of strands that show the colours (S, P, 3) of their roots."""
+    return own_colours(colours[:, 0] ** 2)[1], np.zeros(len(colours), np.uint32)
 
 
 def draw(
@@ -58,7 +61,7 @@ def draw(
     width, height = size
     back = backdrop(height, width, **behind)
     raster = raster_of(size, layers)
-    absorption, key = shown(colours)
+    variation, key = shown(colours)
     for first in range(0, len(points), chunk):
         raster.count(points[first : first + chunk], widths[first : first + chunk], first)
     raster.cut_off(back)
@@ -67,8 +70,8 @@ def draw(
     for _ in range(2):
         for first in range(0, len(points), chunk):
             part = slice(first, first + chunk)
-            raster.add(points[part], widths[part], absorption[part], key[part])
-        wrong = raster.compose(back, shader(), picture)
+            raster.add(points[part], widths[part], variation[part], key[part])
+        wrong = raster.compose(back, shader(colours), picture)
         if not wrong:
             break
     assert not wrong
@@ -155,7 +158,7 @@ def test_few_points_of_dense_hair_are_shaded() -> None:
     raster.cut_off(back)
     raster.add(points, widths, *shown(colours))
     assert raster.shaded == 0
-    raster.compose(back, shader(), np.zeros((64, 64, 3), np.float32))
+    raster.compose(back, shader(colours), np.zeros((64, 64, 3), np.float32))
     part = raster.shaded / (points.size / 3)
     print(f"{part:.1%} of the points")
     assert 0 < part < 0.2
@@ -183,7 +186,7 @@ def test_without_hair_the_backdrop_is_averaged() -> None:
         raster = raster_of((8, 8))
         raster.cut_off(back)
         picture = np.zeros((8, 8, 3), np.float32)
-        assert raster.compose(back, shader(), picture) == 0
+        assert raster.compose(back, shader(np.zeros((2, 2, 3), np.float32)), picture) == 0
         mean = (samples / 255).reshape(8, per_side, 8, per_side, 3).mean(axis=(1, 3))
         assert np.abs(picture - mean).max() < 1e-6
 
@@ -224,22 +227,22 @@ def test_broken_strands_leave_the_others_alone(bad: float) -> None:
 
 def test_wrong_shapes_are_refused() -> None:
     points, widths, colours = bundle(5, 6, 8, 0.8, 32)
-    absorption, key = shown(colours)
+    variation, key = shown(colours)
     raster = kernels.Raster((32, 32), 20.0)
     with pytest.raises(ValueError, match="before begin"):
         raster.count(points, widths, 0)
     raster = raster_of((32, 32))
     with pytest.raises(ValueError, match="before cut_off"):
-        raster.add(points, widths, absorption, key)
+        raster.add(points, widths, variation, key)
     with pytest.raises(ValueError, match="another size"):
         raster.cut_off(backdrop(16, 16))
     raster.cut_off(backdrop(32, 32))
     with pytest.raises(ValueError, match="do not fit"):
-        raster.add(points, widths[:, 1:].copy(), absorption, key)
+        raster.add(points, widths[:, 1:].copy(), variation, key)
     with pytest.raises(ValueError, match="do not fit"):
-        raster.add(points, widths, absorption[1:], key)
-    raster.add(points, widths, absorption, key)
+        raster.add(points, widths, variation[1:], key)
+    raster.add(points, widths, variation, key)
     with pytest.raises(ValueError, match="another number of points"):
-        raster.add(points[:, 1:].copy(), widths[:, 1:].copy(), absorption, key)
+        raster.add(points[:, 1:].copy(), widths[:, 1:].copy(), variation, key)
     with pytest.raises(ValueError, match="another size"):
-        raster.compose(backdrop(32, 32), shader(), np.zeros((16, 16, 3), np.float32))
+        raster.compose(backdrop(32, 32), shader(colours), np.zeros((16, 16, 3), np.float32))

@@ -1,10 +1,12 @@
 """The shading kernel against its formula in numpy, and the laws of light."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from own_colours import own_colours
 from scipy.special import ive
 
 from pipeline import kernels
@@ -61,12 +63,16 @@ def spread(count: int) -> _F64:
     return np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=-1)
 
 
-def radiance(tangents: _F64, eye: _F64, light: kernels.Illumination, sigma: _F32 | float) -> _F32:
+def radiance(
+    tangents: _F64, eye: _F64, light: kernels.Illumination, sigma: float, rough: float = 0.3
+) -> _F32:
     """Radiance (S, 3) of one point each on short strands with these tangents (S, 3), seen from a direction."""
     points = np.stack([-tangents, tangents], axis=1).astype(np.float32) * np.float32(1e-3)
-    absorption = np.ascontiguousarray(np.broadcast_to(np.float32(sigma), (len(tangents), 3)))
+    pigment, usual = own_colours(np.full((2, 3), sigma, np.float32))
+    usual[:, 1] = fibre.variance(rough) / fibre.variance(0.3)
+    variation = usual[np.zeros(len(tangents), int)]
     key = np.arange(len(tangents), dtype=np.uint32)
-    return kernels.shade(points, absorption, key, FAR * eye, light, SCATTERING.tables()).reshape(
+    return kernels.shade(points, variation, key, FAR * eye, light, SCATTERING.tables(pigment)).reshape(
         *points.shape
     )[:, 0]
 
@@ -78,9 +84,9 @@ def along(sine_i: _F64, sine_o: _F64, v: float | _F64) -> _F64:
     return M
 
 
-def formula(tangents: _F64, eye: _F64, L: _F64, sigma: float, room: Room) -> _F64:
+def formula(tangents: _F64, eye: _F64, L: _F64, sigma: float, room: Room, rough: float = 0.3) -> _F64:
     """Radiance (S,) by the closed form, without tables; sigma is one channel, which also stands for green."""
-    v, tilt = fibre.variance(0.3), np.radians(2) * np.array([2, -1, -4, 0])
+    v, tilt = fibre.variances(rough), np.radians(2) * np.array([2, -1, -4, 0])
     si, so = tangents @ L, tangents @ eye
     theta_d = np.abs(np.arcsin(so) - np.arcsin(si)) / 2
     phi = np.arccos(np.clip((eye @ L - so * si) / np.sqrt((1 - so**2) * (1 - si**2)), -1, 1))
@@ -115,19 +121,21 @@ def random_tangents(count: int, seed: int) -> _F64:
     return unit(np.random.default_rng(seed).normal(size=(count, 3)))
 
 
+@pytest.mark.parametrize("rough", [0.3, 0.5])
 @pytest.mark.parametrize(
     "room", [Room(), Room(n=0.4, behind=2.0), Room(n=3.0, behind=0.5), Room(n=12.0, behind=20.0)]
 )
-def test_kernel_follows_the_two_flux_formula(room: Room) -> None:
+def test_kernel_follows_the_two_flux_formula(room: Room, rough: float) -> None:
+    """Also where a strand is rougher than the fibre of the tables."""
     eye, L = unit(np.array([0.3, 0.4, 0.9])), unit(np.array([-0.5, 0.7, 0.2]))
     tangents = random_tangents(400, 1)
     tangents = tangents[(np.abs(tangents @ eye) < 0.95) & (np.abs(tangents @ L) < 0.95)]
     for level in (2, 6, 12):
         sigma = float(SCATTERING.levels[level])
-        shaded = radiance(tangents, eye, room.light(L[None]), sigma)[:, 1].astype(np.float64)
-        exact = formula(tangents, eye, L, sigma, room)
+        shaded = radiance(tangents, eye, room.light(L[None]), sigma, rough)[:, 1].astype(np.float64)
+        exact = formula(tangents, eye, L, sigma, room, rough)
         error = np.sqrt(np.mean((shaded - exact) ** 2)) / exact.mean()
-        print(f"{room} sigma {sigma:.2f}: rms {error:.1e} of the mean")
+        print(f"{room} roughness {rough} sigma {sigma:.2f}: rms {error:.1e} of the mean")
         # Alone on the way the narrow lobes show, whose peaks a bilinear table clips by one part in a hundred
         assert error < (6e-3 if room.n else 2e-2)
 
@@ -148,11 +156,11 @@ def test_white_furnace_returns_what_it_gets() -> None:
     """Light from everywhere on an unshadowed white fibre: it disappears."""
     count = 3000
     light = Room().light(spread(count), 4 * np.pi / count)
-    for degrees in (0, 20, 40, 60):
+    for degrees, rough in itertools.product((0, 20, 40, 60), (0.3, 0.4)):
         theta = np.radians(degrees)
         tangent = np.array([[np.sin(theta), np.cos(theta), 0]])
-        found = radiance(tangent, np.array([1.0, 0, 0]), light, 0.0)[0, 0]
-        print(f"theta_o {degrees}: {found:.4f}")
+        found = radiance(tangent, np.array([1.0, 0, 0]), light, 0.0, rough)[0, 0]
+        print(f"theta_o {degrees}, roughness {rough}: {found:.4f}")
         # 0.986 .. 1.000 on average: theta_d in place of theta_o
         assert 0.95 < found < 1.01
 
@@ -178,9 +186,10 @@ def test_swapping_light_and_eye_changes_nothing() -> None:
     tangents = random_tangents(300, 4)
     a, b = unit(np.array([0.2, 0.5, 0.8])), unit(np.array([-0.6, 0.3, 0.1]))
     points = np.stack([-tangents, tangents], axis=1).astype(np.float32) * np.float32(1e-3)
-    sigma, key = np.full((300, 3), 0.3, np.float32), np.zeros(300, np.uint32)
+    pigment, variation = own_colours(np.full((300, 3), 0.3, np.float32))
+    key = np.zeros(300, np.uint32)
     there, back = (
-        kernels.shade(points, sigma, key, FAR * eye, Room().light(L[None]), flat.tables())
+        kernels.shade(points, variation, key, FAR * eye, Room().light(L[None]), flat.tables(pigment))
         for eye, L in ((a, b), (b, a))
     )
     error = np.abs(there - back).max() / there.mean()
@@ -239,20 +248,21 @@ def test_shading_does_not_depend_on_threads_or_company() -> None:
     before = kernels.threads()
     rng = np.random.default_rng(5)
     points = np.cumsum(rng.normal(size=(203, 7, 3)), axis=1).astype(np.float32) * np.float32(1e-3)
-    sigma = rng.uniform(0, 2, (203, 3)).astype(np.float32)
+    pigment, own = own_colours(rng.uniform(0, 2, (203, 3)).astype(np.float32))
+    own[:, 1] = rng.uniform(0.5, 2, 203)
     key = rng.integers(0, 2**32, 203, dtype=np.uint32)
     light = Room(n=0.5, behind=1.0).light(spread(3), glints=True)
-    eye, tables = np.array([0.1, 0.2, 1.0]), SCATTERING.tables()
+    eye, tables = np.array([0.1, 0.2, 1.0]), SCATTERING.tables(pigment)
     kernels.set_threads(1)
-    alone = kernels.shade(points, sigma, key, eye, light, tables)
+    alone = kernels.shade(points, own, key, eye, light, tables)
     kernels.set_threads(3)
-    assert np.array_equal(kernels.shade(points, sigma, key, eye, light, tables), alone)
+    assert np.array_equal(kernels.shade(points, own, key, eye, light, tables), alone)
     kernels.set_threads(before)
-    part = kernels.shade(points[50:90], sigma[50:90], key[50:90], eye, light, tables)
+    part = kernels.shade(points[50:90], own[50:90], key[50:90], eye, light, tables)
     count = points.shape[1]
     assert np.array_equal(part, alone[50 * count : 90 * count])
     some = np.arange(7, len(alone), 11, dtype=np.uint32)
-    assert np.array_equal(kernels.shade(points, sigma, key, eye, light, tables, some), alone[some])
+    assert np.array_equal(kernels.shade(points, own, key, eye, light, tables, some), alone[some])
 
 
 def test_broken_strands_give_finite_colours() -> None:
@@ -260,13 +270,14 @@ def test_broken_strands_give_finite_colours() -> None:
     points[1] = 1e30
     points[2] = np.nan
     light = Room(n=0.5, behind=1.0).light(spread(2))
-    sigma, key = np.full((3, 3), 0.5, np.float32), np.zeros(3, np.uint32)
-    shaded = kernels.shade(points, sigma, key, np.array([0.0, 0, 1]), light, SCATTERING.tables())
+    pigment, own = own_colours(np.full((3, 3), 0.5, np.float32))
+    key, tables = np.zeros(3, np.uint32), SCATTERING.tables(pigment)
+    shaded = kernels.shade(points, own, key, np.array([0.0, 0, 1]), light, tables)
     assert np.isfinite(shaded[:4]).all()
 
 
 def test_wrong_arrays_are_refused() -> None:
-    light, tables = Room().light(spread(2)), SCATTERING.tables()
+    light, tables = Room().light(spread(2)), SCATTERING.tables(np.ones((2, 2, 4), np.float32))
     points, key = np.zeros((2, 4, 3), np.float32), np.zeros(2, np.uint32)
     with pytest.raises(ValueError, match="do not fit points"):
         kernels.shade(points, np.zeros((3, 3), np.float32), key, np.zeros(3), light, tables)

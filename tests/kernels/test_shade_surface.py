@@ -167,19 +167,19 @@ def test_skin_under_open_sky_shows_its_albedo() -> None:
     assert shaded.mean() > 0.3
 
 
-def all_of(lighting: Lighting, points: NDArray[np.float32], melanin: float) -> NDArray[np.float32]:
+def all_of(lighting: Lighting, points: NDArray[np.float32]) -> NDArray[np.float32]:
     """Linear RGB (S, P, 3) of all points of strands (S, P, 3)."""
     strands, count, _ = points.shape
     which = np.arange(strands * count, dtype=np.uint32)
-    pigment, key = np.full(strands, melanin, np.float32), np.arange(strands, dtype=np.uint32)
-    return lighting.shade(points, pigment, key, EYE, which).reshape(points.shape)
+    usual, key = np.tile(np.float32([0.5, 1, 0]), (strands, 1)), np.arange(strands, dtype=np.uint32)
+    return lighting.shade(points, usual, key, EYE, which).reshape(points.shape)
 
 
 def test_hair_in_the_heads_shadow_is_dark() -> None:
     points, widths = fur(4000, 0.03, lowest=0.8)
     both = np.concatenate([points, points * np.array([1, -1, 1], np.float32)])
-    lighting = lit(SUN, (both, np.concatenate([widths, widths])), sphere())
-    shaded = all_of(lighting, both, 0.4)
+    lighting = lit(SUN, (both, np.concatenate([widths, widths])), sphere(), melanin=0.4)
+    shaded = all_of(lighting, both)
     upper, lower = shaded[: len(points)].mean(), shaded[len(points) :].mean()
     print(f"lit {upper:.4f}, in the head's shadow {lower:.5f}")
     assert lower < 0.1 * upper
@@ -187,8 +187,8 @@ def test_hair_in_the_heads_shadow_is_dark() -> None:
 
 def test_white_hair_in_a_white_sky_disappears() -> None:
     points, widths = fur(3000, 0.03)
-    lighting = lit(SKY, (points, widths), None, melanin=0.0)
-    shaded = all_of(lighting, points, 0.0)
+    lighting = lit(SKY, (points, widths), None, melanin=0.0, melanin_jitter=0.0)
+    shaded = all_of(lighting, points)
     error = np.abs(shaded - 1).max()
     print(f"furnace: {error:.1e}")
     assert error < 1e-4
@@ -198,8 +198,8 @@ def test_more_and_thinner_strands_look_the_same() -> None:
     few, many = fur(2000, 0.03), fur(8000, 0.03)
     means = []
     for points, width in ((few[0], 4e-4), (many[0], 1e-4)):
-        lighting = lit(SUN, (points, np.full(points.shape[:2], width, np.float32)), sphere())
-        means.append(all_of(lighting, points, 0.5).mean((0, 1)))
+        lighting = lit(SUN, (points, np.full(points.shape[:2], width, np.float32)), sphere(), melanin=0.5)
+        means.append(all_of(lighting, points).mean((0, 1)))
     print("few wide / many thin", means[0] / means[1])
     assert means[0] / means[1] == pytest.approx(1, abs=0.03)
 
@@ -209,6 +209,6 @@ def test_a_frame_is_finished_before_it_is_shaded() -> None:
     with pytest.raises(ValueError, match="begin"):
         lighting.add(*ONE_HAIR)
     with pytest.raises(ValueError, match="finish"):
-        all_of(lighting, ONE_HAIR[0], 0.0)
+        all_of(lighting, ONE_HAIR[0])
     with pytest.raises(ValueError, match="bounds"):
         lighting.begin(np.full(3, np.inf), np.full(3, -np.inf), 1e-4)

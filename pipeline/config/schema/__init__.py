@@ -15,7 +15,7 @@ from pipeline.config.schema.hair_contact import HairContact
 from pipeline.config.schema.interpolate import Interpolate, Variation
 from pipeline.config.schema.lights import PRESETS, Light
 from pipeline.config.schema.partings import Parting
-from pipeline.config.schema.render import Fibre, Render
+from pipeline.config.schema.render import Dye, Fibre, Render, Stop
 from pipeline.config.schema.scalp import Plane, Scalp
 from pipeline.config.schema.scene import Scene
 from pipeline.config.schema.simulate import Air, Contact, Hair, Keyframe, Keyframes, Motion, SagFree, Simulate
@@ -50,6 +50,7 @@ __all__ = [
     "Contact",
     "Curl",
     "Direction",
+    "Dye",
     "Fibre",
     "Flyaway",
     "Fringe",
@@ -74,6 +75,7 @@ __all__ = [
     "Section",
     "Simulate",
     "Sphere",
+    "Stop",
     "Swatch",
     "Sweep",
     "Trim",

@@ -1,12 +1,33 @@
 """Options of stage 4: the frames."""
 
 import math
-from typing import Annotated, Literal
+from itertools import pairwise
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.config.schema.base import Fraction, Section
 from pipeline.config.units import Angle, Length
+
+
+class Dye(Section):
+    colour: tuple[Fraction, Fraction, Fraction]
+    """sRGB of much white hair with it. Dye takes light away as melanin does, so bright colours need hair with little melanin."""
+    amount: Fraction = 1.0
+    """Part of that absorption."""
+
+
+class Stop(Section):
+    at: Fraction
+    """Place on the strand: 0 is the root, 1 the tip."""
+    melanin: Fraction | None = None
+    """Melanin there."""
+    redness: Fraction | None = None
+    """Share of pheomelanin there."""
+    dye: Fraction | None = None
+    """Amount of the dye there."""
+    roughness: Annotated[float, Field(ge=0.1, le=1)] | None = None
+    """Longitudinal roughness there."""
 
 
 class Fibre(Section):
@@ -18,12 +39,29 @@ class Fibre(Section):
     """Spread of the melanin from strand to strand."""
     roughness: Annotated[float, Field(ge=0.1, le=1)] = 0.3
     """Longitudinal roughness."""
+    roughness_jitter: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Spread of the longitudinal roughness from strand to strand."""
     azimuthal_roughness: Annotated[float, Field(ge=0.1, le=1)] = 0.3
     """Roughness around the fibre."""
     tilt: Angle = 0.03490658503988659
     """Tilt of the cuticle scales."""
     glints: bool = True
     """Sample visibility per strand instead of averaging it: single exposed strands sparkle."""
+    dye: Dye | None = None
+    """Dye on top of the melanin."""
+    along: tuple[Stop, ...] = ()
+    """Values that change from root to tip, in stops; a value that no stop sets is the one of this table."""
+    along_jitter: Fraction = 0.0
+    """Spread of where on a strand these stops lie from strand to strand, as a part of its length."""
+
+    @model_validator(mode="after")
+    def _from_root_to_tip(self) -> Self:
+        places = [stop.at for stop in self.along]
+        if any(b <= a for a, b in pairwise(places)):
+            raise ValueError("stops go from root to tip: each `at` is greater than the one before")
+        if self.dye is None and any(stop.dye is not None for stop in self.along):
+            raise ValueError("a stop has dye, but dye.colour is not set")
+        return self
 
 
 class Render(Section):
