@@ -8,7 +8,7 @@
 #include "distance_field.hpp"
 #include "pose.hpp"
 #include "shadow_map.hpp"
-#include "sky.hpp"
+#include "sweep.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -27,17 +27,18 @@ struct Casters {
 struct HairVoxels {
     static constexpr float kDeep = 16; // strands, behind which nothing is lit directly
 
-    std::vector<float> density; // (nx, ny, nz) [1/m]
+    const float *density; // (nx, ny, nz) [1/m]
     int n[3];
-    float origin[3];            // [m] corner of the first voxel, from the maps' centre on
-    float spacing;              // [m]
+    float origin[3];      // [m] corner of the first voxel, from the maps' centre on
+    float spacing;        // [m]
 
     /// Whether something is deep, for each voxel.
     std::vector<uint8_t> deep(const float direction[3]) const {
-        std::vector<float> before(density.size());
-        sweep(density.data(), before.data(), n, spacing, direction);
-        std::vector<uint8_t> result(density.size());
-        for (size_t i = 0; i < result.size(); ++i) result[i] = before[i] > kDeep;
+        const size_t voxels = size_t(n[0]) * n[1] * n[2];
+        std::vector<float> before(voxels);
+        sweep(density, before.data(), n, spacing, direction);
+        std::vector<uint8_t> result(voxels);
+        for (size_t i = 0; i < voxels; ++i) result[i] = before[i] > kDeep;
         return result;
     }
 
@@ -66,8 +67,8 @@ class ShadowFill {
   public:
     ShadowFill(ShadowMap &map, const Casters &casters, int threads) : map_(map), casters_(casters), threads_(threads) {}
 
-    void operator()(const HairVoxels &voxels) {
-        place(voxels);
+    void operator()(const HairVoxels &voxels, const std::vector<uint8_t> &deep) {
+        place(voxels, deep);
         sort_into_squares();
         find_front();
         sum_layers();
@@ -89,9 +90,7 @@ class ShadowFill {
     int squares() const { return (map_.n[0] + kSide - 1) / kSide * across(); }
 
     /// All segments on the map, in the order of strands.
-    void place(const HairVoxels &voxels) {
-        const float to_light[3] = {-map_.axis[2][0], -map_.axis[2][1], -map_.axis[2][2]};
-        const std::vector<uint8_t> deep = voxels.deep(to_light);
+    void place(const HairVoxels &voxels, const std::vector<uint8_t> &deep) {
         const int P = casters_.P;
         segments_.resize(casters_.count() * size_t(std::max(P - 1, 0)));
 #pragma omp parallel for schedule(static) num_threads(threads_)

@@ -60,8 +60,16 @@ struct Shadows {
 
     /// Makes the maps of all that was added and of the head.
     void finish(const HairVoxels &voxels, const DistanceField *field, const Pose &pose, int threads) {
-        for (ShadowMap &map : maps) {
-            ShadowFill(map, casters, threads)(voxels);
+        std::vector<std::vector<uint8_t>> deep(maps.size());
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+        for (size_t l = 0; l < maps.size(); ++l) {
+            const auto &away = maps[l].axis[2];
+            const float to_light[3] = {-away[0], -away[1], -away[2]};
+            deep[l] = voxels.deep(to_light);
+        }
+        for (size_t l = 0; l < maps.size(); ++l) {
+            ShadowMap &map = maps[l];
+            ShadowFill(map, casters, threads)(voxels, deep[l]);
             find_solid(map, field, pose, threads);
         }
         casters = {};

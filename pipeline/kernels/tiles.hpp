@@ -39,7 +39,7 @@ class Tile {
   public:
     static constexpr int kPixels = kTile * kTile;
     static constexpr int kWindow = 2;
-    static constexpr float kClosed = 1.0f / 256;
+    static constexpr float kClosed = 1.0f / 64;
 
     /// With names, notes which segment takes most of each pixel.
     Tile(const View &view, const Backdrop &back, bool names) : view_(view), back_(back), names_(names) {}
