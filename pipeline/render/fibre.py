@@ -15,7 +15,7 @@ theta_o: reciprocal, and one axis less; `test_white_fibre_keeps_all_light` bound
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
@@ -90,6 +90,13 @@ def logistic_integral(x: _F64, s: float) -> _F64:
     return integral
 
 
+@lru_cache
+def _gauss() -> tuple[_F64, _F64]:
+    """Gauss and Legendre's nodes and weights across the fibre."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return nodes, weights
+
+
 def far_field(cosine: _F64, phi: _F64, sigma: _F64, azimuthal_roughness: float) -> tuple[_F64, _F64]:
     """N and its half-circle mean G, both (4, A, T, H) [1/rad].
 
@@ -101,7 +108,7 @@ def far_field(cosine: _F64, phi: _F64, sigma: _F64, azimuthal_roughness: float) 
 
     """
     s = scale(azimuthal_roughness)
-    h, weight = np.polynomial.legendre.leggauss(NODES)
+    h, weight = _gauss()
     # A is even in h and Phi odd: nodes h > 0 see phi and -phi
     h, weight = h[NODES // 2 :], weight[NODES // 2 :] / 2
     leaving = weight * attenuation(cosine[:, None], h, sigma[:, None, None])
