@@ -162,7 +162,7 @@ struct Bins {
             const float columns = float(across - 1), rows = float(view.down() * kSide - 1);
             const Mask<float> a0 = place(x0 * per_tile, columns), a1 = place(x1 * per_tile, columns);
             const Mask<float> b0 = place(y0 * per_tile, rows), b1 = place(y1 * per_tile, rows);
-            const Floats deepest = maximum<float>(around_at(b0 * across + a0), around_at(b1 * across + a1));
+            const Floats deepest = maximum<float>(gather_floats(around.data(), b0 * across + a0), gather_floats(around.data(), b1 * across + a1));
             const Mask<float> far = (a0 - a1 > 2) | (a1 - a0 > 2) | (b0 - b1 > 2) | (b1 - b0 > 2) | (wide > float(kTile));
             const uint32_t passed = set_lanes<float>(inside & (far | (minimum<float>(d0, d1) <= deepest)));
             return passed & ((1u << std::min(strands.P - 1 - j, 16)) - 1);
@@ -176,12 +176,6 @@ struct Bins {
 
         static RINGLET_INLINE Mask<float> place(Floats x, float last) {
             return __builtin_convertvector(minimum<float>(maximum<float>(x, splat(0.0f)), splat(last)), Mask<float>);
-        }
-
-        RINGLET_INLINE Floats around_at(Mask<float> tile) const {
-            Floats depth;
-            for (int k = 0; k < kLanes<float>; ++k) depth[k] = around[tile[k]];
-            return depth;
         }
 
         /// Enters a segment into the blocks where it may be seen; whether there are any.

@@ -17,8 +17,9 @@ class Painter {
   public:
     size_t shaded = 0; // points
 
-    Painter(const View &view, const Backdrop &back, Bins &bins, const PointShader &shader, const Pictures &pictures)
-        : view_(view), bins_(bins), shader_(shader), pictures_(pictures), tile_(view, back, pictures.names) {}
+    /// `solid` is the farthest depth of the backdrop in each tile.
+    Painter(const View &view, const Backdrop &back, const std::vector<float> &solid, Bins &bins, const PointShader &shader, const Pictures &pictures)
+        : view_(view), solid_(solid), bins_(bins), shader_(shader), pictures_(pictures), tile_(view, back, pictures.names) {}
 
     /// Draws the wrong tiles of a block, and sets what is wrong with them now; how many of them still are.
     int block(int block, const uint32_t *number, size_t count, uint8_t *wrong, TilePixels *lacking) {
@@ -26,7 +27,13 @@ class Painter {
         int still = 0;
         for (int tile = block * kCount; tile < (block + 1) * kCount; ++tile) {
             if (!wrong[tile]) continue;
-            tile_.begin(tile, bins_.wanted.empty() ? TilePixels::all() : bins_.wanted[tile]);
+            const TilePixels wanted = bins_.wanted.empty() ? TilePixels::all() : bins_.wanted[tile];
+            if (entries_[tile - block * kCount].empty() && bins_.cut[tile] >= solid_[tile] && !pictures_.names) {
+                tile_.bare(tile, wanted, pictures_.colour);
+                lacking[tile] = TilePixels::none(), wrong[tile] = 0;
+                continue;
+            }
+            tile_.begin(tile, wanted);
             order_.begin(entries_[tile - block * kCount]);
             lacking[tile] = draw(bins_.cut[tile]);
             tile_.write(pictures_.colour);
@@ -42,6 +49,7 @@ class Painter {
     static constexpr size_t kPortion = 256; // entries that are shaded together
 
     const View &view_;
+    const std::vector<float> &solid_;
     Bins &bins_;
     const PointShader &shader_;
     const Pictures &pictures_;

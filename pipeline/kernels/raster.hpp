@@ -21,6 +21,7 @@ class Raster {
     float layers; // of hair behind which nothing is seen
     Layers counted;
     Bins bins;
+    std::vector<float> solid; // the farthest depth of the backdrop in each tile
     size_t shaded = 0; // points of the picture; a few of them twice, where threads meet
     std::vector<uint8_t> wrong; // tiles that are not drawn yet, or have pixels that were cut off too early
 
@@ -37,7 +38,7 @@ class Raster {
     void cut_off(const Backdrop &back, int threads) {
         bins.cut = counted.depths(view, layers, threads);
         counted.counts.clear();
-        const std::vector<float> solid = deepest(back, threads);
+        solid = deepest(back, threads);
         for (int tile = 0; tile < view.tiles(); ++tile) bins.cut[tile] = std::min(bins.cut[tile], solid[tile]);
         wrong.assign(view.tiles(), 1);
         bins.wanted.clear();
@@ -53,7 +54,7 @@ class Raster {
         size_t points = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : count, points)
         {
-            auto painter = std::make_unique<Painter>(view, back, bins, shader, pictures);
+            auto painter = std::make_unique<Painter>(view, back, solid, bins, shader, pictures);
 #pragma omp for schedule(dynamic, 1)
             for (int block = 0; block < view.across() * view.down(); ++block)
                 count += painter->block(block, segments.data() + begin[block], begin[block + 1] - begin[block], wrong.data(),
@@ -62,14 +63,13 @@ class Raster {
         }
         shaded += points;
         bins.clear();
-        if (count) only(std::move(lacking), back, threads);
+        if (count) only(std::move(lacking));
         return count;
     }
 
   private:
     /// From now on only these pixels are wanted, and nothing before the backdrop is cut off.
-    void only(std::vector<TilePixels> pixels, const Backdrop &back, int threads) {
-        const std::vector<float> solid = deepest(back, threads);
+    void only(std::vector<TilePixels> pixels) {
         for (int tile = 0; tile < view.tiles(); ++tile) bins.cut[tile] = wrong[tile] ? solid[tile] : -1;
         bins.wanted = std::move(pixels);
     }
@@ -77,14 +77,23 @@ class Raster {
     /// The farthest depth of the backdrop in each tile; -1 outside the picture.
     std::vector<float> deepest(const Backdrop &back, int threads) const {
         std::vector<float> depth(view.tiles(), -1);
-        const int side = kTile * back.n;
+        const int side = kTile * back.n, across = view.W * back.n, down = view.H * back.n;
 #pragma omp parallel for schedule(static) num_threads(threads)
-        for (int row = 0; row < (view.H + kTile - 1) / kTile; ++row)
-            for (int y = row * side; y < std::min((row + 1) * side, view.H * back.n); ++y)
-                for (int x = 0; x < view.W * back.n; ++x) {
-                    float &at = depth[view.tile(x / side, row)];
-                    at = std::max(at, back.depth[size_t(y) * view.W * back.n + x]);
+        for (int top = 0; top < down; top += side)
+            for (int left = 0; left < across; left += side) {
+                Floats most = splat(-1.0f);
+                for (int y = top; y < std::min(top + side, down); ++y) {
+                    const float *row = back.depth + size_t(y) * across;
+                    int x = left;
+                    for (; x + 16 <= std::min(left + side, across); x += 16) {
+                        Floats here;
+                        std::memcpy(&here, row + x, sizeof here);
+                        most = maximum<float>(most, here);
+                    }
+                    for (; x < std::min(left + side, across); ++x) most[0] = std::max(most[0], row[x]);
                 }
+                depth[view.tile(left / side, top / side)] = largest<float>(most);
+            }
         return depth;
     }
 

@@ -288,12 +288,25 @@ class ShadowFill {
     }
 };
 
+/// Where rays enter the box of a field, and where they leave it [m]; they miss it if that is not later.
+inline void within(const DistanceField &field, const Vec3<float> &start, const Vec3<float> &along, Floats &first, Floats &last) {
+    const Floats from[3] = {start.x, start.y, start.z}, step[3] = {along.x, along.y, along.z};
+    first = splat(-1e6f), last = splat(1e6f);
+    for (int k = 0; k < 3; ++k) {
+        const float low = float(field.origin[k]), high = low + float(field.spacing) * (field.n[k] - 1);
+        const Ints flat = (step[k] < 1e-6f) & (step[k] > -1e-6f);
+        const Floats inverse = 1.0f / (flat ? splat(1e-6f) : step[k]);
+        const Floats a = (low - from[k]) * inverse, b = (high - from[k]) * inverse;
+        first = maximum<float>(first, minimum<float>(a, b)), last = minimum<float>(last, maximum<float>(a, b));
+    }
+}
+
 /// Where rays from the light meet the head, by its distance field (Hart, Sphere Tracing, 1996).
 inline void find_solid(ShadowMap &map, const DistanceField *field, const Pose &pose, int threads) {
     map.solid.assign(map.nodes(), ShadowMap::kFar);
     if (!field) return;
     const Rigid<float> to_rest(pose.inverse());
-    const float reach = float(field->spacing) * (field->n[0] + field->n[1] + field->n[2]); // beyond the head
+    const Vec3<float> away = to_rest.turn({splat(map.axis[2][0]), splat(map.axis[2][1]), splat(map.axis[2][2])});
     Floats lane;
     for (int k = 0; k < 16; ++k) lane[k] = float(k);
     const auto world = [&](int k, Floats u, Floats v, Floats w) RINGLET_ALWAYS {
@@ -303,14 +316,16 @@ inline void find_solid(ShadowMap &map, const DistanceField *field, const Pose &p
     for (int i = 0; i < map.n[0]; ++i)
         for (int first = 0; first < map.n[1]; first += 16) {
             const Floats u = splat(map.low[0] + i * map.spacing), v = (lane + float(first)) * map.spacing + map.low[1];
-            Floats way = splat(-reach), phi, hit = splat(ShadowMap::kFar);
+            const Floats w = splat(map.low[2]);
+            const Vec3<float> start = to_rest(Vec3<float>{world(0, u, v, w), world(1, u, v, w), world(2, u, v, w)});
+            Floats way, end, phi, hit = splat(ShadowMap::kFar);
+            within(*field, start, away, way, end);
             Vec3<float> gradient;
-            Ints open = lane >= 0.0f;
+            Ints open = way < end;
             for (int step = 0; step < 128 && any<float>(open); ++step) {
-                const Floats w = way + map.low[2];
-                sample(*field, to_rest(Vec3<float>{world(0, u, v, w), world(1, u, v, w), world(2, u, v, w)}), phi, gradient);
+                sample(*field, start + way * away, phi, gradient);
                 hit = (open & (phi < 1e-4f)) ? way : hit;
-                open &= (phi >= 1e-4f) & (way < reach);
+                open &= (phi >= 1e-4f) & (way < end);
                 way += open ? maximum<float>(phi, splat(2e-4f)) : splat(0.0f);
             }
             for (int k = 0; k < 16 && first + k < map.n[1]; ++k) map.solid[size_t(i) * map.n[1] + first + k] = hit[k];

@@ -163,6 +163,17 @@ RINGLET_INLINE void gather_pairs(const float *values, Mask<Real> at, Lanes<Real>
 #endif
 }
 
+/// values[at] of every lane.
+RINGLET_INLINE Lanes<float> gather_floats(const float *values, Mask<float> at) {
+#ifdef __AVX512F__
+    return Lanes<float>(_mm512_mask_i32gather_ps(_mm512_setzero_ps(), 0xffff, __m512i(at), values, 4));
+#else
+    Lanes<float> result;
+    for (int lane = 0; lane < kLanes<float>; ++lane) result[lane] = values[at[lane]];
+    return result;
+#endif
+}
+
 /// values[at] of every lane; three more bytes behind the last value may be read.
 RINGLET_INLINE Mask<float> gather_bytes(const int8_t *values, Mask<float> at) {
 #ifdef __AVX512F__

@@ -71,6 +71,22 @@ class Tile {
 
     bool closed() const { return open_count_ == 0; }
 
+    /// Writes the backdrop into these pixels of a tile without hair.
+    void bare(int tile, const TilePixels &wanted, float *picture) const {
+        const int left = view_.left(tile), top = view_.top(tile);
+        for (int y = top; y < std::min(top + kTile, view_.H); ++y)
+            for (int x = left; x < std::min(left + kTile, view_.W); ++x) {
+                if (!wanted.has(x - left, y - top)) continue;
+                float sum[3] = {};
+                for (int j = 0; j < back_.n; ++j)
+                    for (int i = 0; i < back_.n; ++i) {
+                        const uint8_t *at = back_.samples + 3 * back_.sample(view_, x, y, i, j);
+                        for (int c = 0; c < 3; ++c) sum[c] += back_.decode[at[c]];
+                    }
+                for (int c = 0; c < 3; ++c) picture[3 * (size_t(y) * view_.W + x) + c] = sum[c] / float(back_.n * back_.n);
+            }
+    }
+
     /// The open pixels that a segment may touch, for `draw`.
     RINGLET_INLINE Words reached(const Segment &s) const { return crossed(s, float(left_), float(top_), open_, step_); }
 

@@ -31,6 +31,7 @@ class Coverage:
         """Prepare for frames of `size` [px] over the target."""
         self._target, self._size = target, size
         self._raster = kernels.Raster(size, _LAYERS)
+        self._blank: kernels.Backdrop | None = None
 
     def begin(self, camera: View) -> None:
         """Start a frame; the target has been cleared for it."""
@@ -46,6 +47,13 @@ class Coverage:
 
         `chunks` gives all of them, the same each time that it is called.
         """
+        if self._target.blank:  # the same everywhere: one sample tells it
+            if self._blank is None:
+                depth, samples = self._target.depth(), self._target.read()
+                across, down = self._size
+                one = np.ascontiguousarray(samples[:down, :across])
+                self._blank = kernels.Backdrop(np.ascontiguousarray(depth[:down, :across]), one, DECODED, 1)
+            return self._drawn(chunks, shader, self._blank)
         samples, depth = np.ascontiguousarray(self._target.read()), self._target.depth()
         return self._drawn(chunks, shader, self._backdrop(depth, samples, DECODED))
 

@@ -275,13 +275,14 @@ class FrameRenderer:
             return
         if self._finer is None:
             self._finer = Finer(skin.triangles, len(skin.points))
-        finer, rotation = self._finer, pose[:3, :3].astype(np.float32)
-        points = np.ascontiguousarray(finer(skin.points) @ rotation.T + pose[:3, 3].astype(np.float32))
-        normals = finer(skin.normals) @ rotation.T
-        normals = np.ascontiguousarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
-        curvature = None if skin.curvature is None else finer(skin.curvature)
-        colours = self.lighting.shade_surface(points, normals, finer(skin.albedo), eye, curvature)
-        self.target.triangles(points, finer.triangles, colours)
+        finer, rotation = self._finer, pose[:3, :3]
+        seen, triangles = finer.facing(skin.points, skin.normals, (eye - pose[:3, 3]) @ rotation)
+        points = _turned(finer(skin.points)[seen], rotation) + pose[:3, 3].astype(np.float32)
+        normals = _turned(finer(skin.normals)[seen], rotation)
+        normals /= np.sqrt((normals * normals).sum(axis=1, keepdims=True))
+        curvature = None if skin.curvature is None else finer(skin.curvature)[seen]
+        colours = self.lighting.shade_surface(points, normals, finer(skin.albedo)[seen], eye, curvature)
+        self.target.triangles(points, triangles, colours)
 
     def _corners(
         self, moment: Moment, lower: NDArray[np.float64], upper: NDArray[np.float64]
@@ -311,6 +312,12 @@ def _bounds(moment: Moment) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         middle + _MARGIN * np.floor(lower / _MARGIN - 1),
         middle + _MARGIN * np.ceil(upper / _MARGIN + 1),
     )
+
+
+def _turned(vectors: Points, rotation: NDArray[np.float64]) -> Points:
+    """Vectors (N, 3) turned by a matrix (3, 3); column by column, which wakes no threads."""
+    x, y, z = (vectors[:, i : i + 1] * rotation[:, i].astype(np.float32) for i in range(3))
+    return np.asarray(x + y + z, np.float32)
 
 
 def _box_corners(box: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -55,6 +55,9 @@ class Target:
         self._actor.GetProperty().LightingOff()
         self._renderer.AddActor(self._actor)
         self._kept: list[Any] = []
+        self._blank: NDArray[np.uint8] | None = None
+        self.blank = False
+        """Whether there is nothing but the background since `background`."""
 
     def clear(self, camera: View, near: float, far: float) -> None:
         """Start a picture; what lies between the distances `near` and `far` [m] from the camera is drawn."""
@@ -66,6 +69,7 @@ class Target:
         half = np.tan(camera.field_of_view / 2)
         view.SetWindowCenter(camera.shift[0] / half * self.height / self.width, camera.shift[1] / half)
         view.SetClippingRange(max(near - _MARGIN, 0.01 * far), far + _MARGIN)
+        self.blank = False
         self._renderer.PreserveColorBufferOff()
         self._renderer.PreserveDepthBufferOff()
 
@@ -73,7 +77,10 @@ class Target:
         """Draw nothing but the background."""
         from vtkmodules.vtkCommonDataModel import vtkPolyData
 
-        self._draw(vtkPolyData())
+        if self._blank is None:
+            self._draw(vtkPolyData())
+            self._blank = self.read()[0, 0].copy()
+        self.blank = True  # it is drawn with what comes first
 
     def triangles(self, points: Points, triangles: NDArray[np.integer[Any]], colours: Colours) -> None:
         """Draw triangles (T, 3) over points (N, 3) [m] with linear colours (N, 3)."""
@@ -111,6 +118,8 @@ class Target:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
+        if self.blank and self._blank is not None:
+            return np.tile(self._blank, (self.height, self.width, 1))
         pixels = vtkUnsignedCharArray()
         self._window.GetPixelData(0, 0, self.width - 1, self.height - 1, 0, pixels, 0)
         return np.asarray(vtk_to_numpy(pixels)).reshape(self.height, self.width, 3)[::-1]
@@ -120,6 +129,8 @@ class Target:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkFloatArray
 
+        if self.blank:
+            return np.full((self.height, self.width), NOTHING, np.float32)
         values = vtkFloatArray()
         self._window.GetZbufferData(0, 0, self.width - 1, self.height - 1, values)
         depth = np.array(np.asarray(vtk_to_numpy(values)).reshape(self.height, self.width)[::-1])
@@ -150,6 +161,7 @@ class Target:
         self._window.Finalize()
 
     def _draw(self, mesh: Any) -> None:
+        self.blank = False
         self._mapper.SetInputData(mesh)
         self._window.Render()
         self._renderer.PreserveColorBufferOn()

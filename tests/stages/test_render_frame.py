@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from pipeline import cache, kernels
 from pipeline.compare.metrics import measure
 from pipeline.config.schema import Camera, Config, Groom, Render, Scene
 from pipeline.render import chunks
+from pipeline.render.finer import Finer
 from pipeline.render.frame import FrameRenderer, Moment, Skin
 from pipeline.render.tone import to_srgb
 from pipeline.strands.expand import Binding, Expansion
@@ -115,6 +117,25 @@ def test_the_head_hides_what_is_behind_it() -> None:
     middle = (slice(46, 50), slice(44, 52))
     assert np.abs(behind[middle] - empty[middle]).max() <= 12
     assert np.abs(before[middle] - empty[middle]).max() > 30
+
+
+def test_of_a_closed_head_nothing_is_missed_that_faces_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    rest, skin = hanging(40), ball()
+    faces = Finer(skin.triangles, len(skin.points))
+    eye = np.array([0.0, 0.0, 0.6])
+    points, triangles = faces.facing(skin.points, skin.normals, eye)
+    print(f"{len(triangles)} of {4 * len(skin.triangles)} triangles, {len(points)} points are drawn")
+    assert faces.closed
+    assert 0.3 < len(triangles) / (4 * len(skin.triangles)) < 0.5
+    front = render(config(), rest, skin)
+    facing = Finer.facing
+
+    def everything(self: Finer, *arguments: Any) -> Any:
+        self.closed = False
+        return facing(self, *arguments)
+
+    monkeypatch.setattr(Finer, "facing", everything)
+    assert np.array_equal(render(config(), rest, skin), front)
 
 
 def test_a_frame_of_the_same_moment_has_the_same_bytes() -> None:
