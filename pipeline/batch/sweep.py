@@ -30,8 +30,13 @@ def batch_of(run: Run, outputs: Path) -> Batch:
     return Batch(run.loaded.config, Experiment(outputs / run.name))
 
 
-def make_all(batches: Sequence[Batch], touch: bool = True) -> None:
-    """Make every stage of every experiment that is not fresh.
+def make_all(
+    batches: Sequence[Batch],
+    touch: bool = True,
+    stages: Sequence[str] = STAGES,
+    frames: range | None = None,
+) -> None:
+    """Make every stage, or some, and all frames, or some, of every experiment that is not fresh.
 
     An experiment that cannot be made does not stop the others; raises InputError of all such at the end.
     """
@@ -41,8 +46,8 @@ def make_all(batches: Sequence[Batch], touch: bool = True) -> None:
         say("sweep", f"{number}/{len(batches)} {name}")
         try:
             with log.kept_in(batch.experiment.log):
-                for stage in STAGES:
-                    batch.make(stage, touch=touch)
+                for stage in stages:
+                    batch.make(stage, frames if stage == "render" else None, touch=touch)
         except InputError as error:
             say("sweep", f"{name} failed; going on with the others")
             wrong.append(f"{name}: {error}")

@@ -97,6 +97,8 @@ FrameRange = Annotated[
     str, Parameter(show_default=False, help='Only these frames, counted from 1: "10-20", or one, "7".')
 ]
 
+Stage = Annotated[str, Parameter(help="The last stage to run: groom, simulate, interpolate or render.")]
+
 OUTPUTS = Path("outputs")
 
 
@@ -112,6 +114,15 @@ def experiment_of(loaded: "Loaded", outputs: Path) -> "Experiment":
     from pipeline.cache import Experiment
 
     return Experiment(outputs / loaded.config.name)
+
+
+def stages_until(stage: str) -> tuple[str, ...]:
+    """Stages from the first to that of `--until`. Raises InputError."""
+    from pipeline.config import STAGES
+
+    if stage not in STAGES:
+        raise InputError(f"--until {stage}: expected one of {', '.join(STAGES)}")
+    return STAGES[: STAGES.index(stage) + 1]
 
 
 def frame_range(text: str, count: int) -> range | None:

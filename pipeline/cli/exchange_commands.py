@@ -95,18 +95,25 @@ def export_openjd(
             help="A file above config and outputs, or both are to be given with the job; <name>.openjd.json.",
         ),
     ] = None,
+    sweep: Annotated[
+        bool, Parameter(negative="", show_default=False, help="All experiments of the config's [sweep].")
+    ] = False,
     settings: Settings = (),
     outputs: Outputs = OUTPUTS,
 ) -> None:
-    """Write a run as a job template of Open Job Description, which render farms read."""
+    """Write a run, or a whole sweep, as a job template of Open Job Description, which render farms read."""
     import json
 
     from pipeline.cache import replacing
-    from pipeline.farm.openjd import template
+    from pipeline.config.sweep import load_sweep
+    from pipeline.farm.openjd import sweep_template, template
 
     loaded = load_config(config, settings)
     path = to or Path(f"{loaded.config.name}.openjd.json")
-    job = template(loaded.config, config, outputs, path.parent, settings)
+    if sweep:
+        job = sweep_template(load_sweep(config, settings), config, outputs, path.parent, settings)
+    else:
+        job = template(loaded.config, config, outputs, path.parent, settings)
     with replacing(path) as temporary:
         temporary.write_text(json.dumps(job, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     print(path)

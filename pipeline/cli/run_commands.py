@@ -17,11 +17,13 @@ from pipeline.cli.base import (
     Manner,
     Outputs,
     Settings,
+    Stage,
     Where,
     app,
     experiment_of,
     frame_range,
     load_config,
+    stages_until,
 )
 from pipeline.errors import InputError
 
@@ -31,7 +33,6 @@ if TYPE_CHECKING:
     from pipeline.config import Loaded
 
 _CODEC = "h264 (.mp4), av1 (.av1.mp4) or ffv1 (.mkv, lossless, all bits of the frames)."
-Stage = Annotated[str, Parameter(help="The last stage to run: groom, simulate, interpolate or render.")]
 
 
 @app.command(group=STAGES_GROUP, sort_key=1)
@@ -167,15 +168,14 @@ def _make(
     refuse_bare_start()  # before anything large is loaded
     from pipeline.batch.stages import Batch
     from pipeline.cache import where_writable
-    from pipeline.config import NEEDS, STAGES
+    from pipeline.config import NEEDS
     from pipeline.report import write_run_page
 
-    if stage not in STAGES:
-        raise InputError(f"--until {stage}: expected one of {', '.join(STAGES)}")
+    earlier = stages_until(stage)[:-1]
     loaded = load_config(config, settings)
     wanted = frame_range(frames, loaded.config.simulate.frames)
     batch = Batch(loaded.config, experiment_of(loaded, outputs))
-    before = STAGES[: STAGES.index(stage)] if everything else NEEDS[stage]
+    before = earlier if everything else NEEDS[stage]
     with log.kept_in(batch.experiment.log):
         if not manner.force:
             refuse_what_does_not_fit(batch, (*before, stage), where, wanted)

@@ -11,11 +11,15 @@ from pipeline.cli.base import (
     OUTPUTS,
     STAGES_GROUP,
     ConfigFile,
+    FrameRange,
     Manner,
     Outputs,
     Settings,
+    Stage,
     Where,
     app,
+    frame_range,
+    stages_until,
 )
 
 
@@ -33,17 +37,21 @@ def sweep(
     names: Annotated[
         bool, Parameter(negative="", show_default=False, help="Print the experiments' names and do nothing.")
     ] = False,
+    until: Stage = "render",
+    frames: FrameRange = "",
     settings: Settings = (),
     outputs: Outputs = OUTPUTS,
     manner: Manner = AS_USUAL,
     where: Where = HERE,
 ) -> None:
-    """Run every experiment of a config's [sweep]; stages that its values do not touch are made once."""
+    """Run every experiment of a config's [sweep]; stages that its values do not touch are made once.
+
+    The table and the page are of whole experiments: with --until or --frames, where others do the rest, they wait.
+    """
     from pipeline.batch.sweep import batch_of, chosen, make_all
     from pipeline.batch.table import write_table
     from pipeline.cache import Experiment
     from pipeline.cli.run_commands import refuse_what_does_not_fit
-    from pipeline.config import STAGES
     from pipeline.config.sweep import load_sweep
     from pipeline.report import write_sweep_page
 
@@ -53,18 +61,21 @@ def sweep(
     if names:
         print("\n".join(run.name for run in runs))
         return
+    stages = stages_until(until)
+    wanted = frame_range(frames, min(run.loaded.config.simulate.frames for run in runs))
     with log.kept_in(Experiment(outputs / swept.base.config.name).log):
         batches = [batch_of(run, outputs) for run in runs]
         if not manner.force:
             for batch in batches:
-                refuse_what_does_not_fit(batch, STAGES, where)
+                refuse_what_does_not_fit(batch, stages, where, wanted)
         try:
             if not where.here:
                 from pipeline.farm.run import make
 
-                make(batches, where.workers, where.scheduler)
-            make_all(batches)
+                make(batches, where.workers, where.scheduler, until, wanted)
+            make_all(batches, stages=stages, frames=wanted)
         finally:
-            table = write_table(swept, outputs, config)
-        page = write_sweep_page(table)
-    print(table, page, sep="\n")
+            if until == "render" and wanted is None:
+                table = write_table(swept, outputs, config)
+        if until == "render" and wanted is None:
+            print(table, write_sweep_page(table), sep="\n")

@@ -101,3 +101,44 @@ def test_frames_do_not_depend_on_threads_or_on_how_they_are_split(
 def test_one_processor_gives_the_same_bytes(undisturbed: cache.Experiment, tmp_path: Path) -> None:
     """A whole run, whose libraries' own threads are limited as well."""
     tiny.assert_same(tiny.run(tmp_path, processors=[min(os.sched_getaffinity(0))]), undisturbed)
+
+
+@pytest.fixture(scope="module")
+def two_workers() -> Iterator[str]:
+    """A scheduler of two workers."""
+    pytest.importorskip("distributed", reason='needs the extra "farm"')
+    from pipeline.farm.cluster import local_cluster
+
+    with local_cluster(2) as address:
+        yield address
+
+
+@pytest.mark.parametrize(
+    ("threads", "cut", "split"),
+    [(1, 9, [range(7, 11), range(2, 4)]), (2, 0, [range(1, 11)])],
+    ids=["one thread, resumed, pieces", "two threads, whole"],
+)
+def test_workers_give_the_same_bytes(
+    undisturbed: cache.Experiment,
+    batch: Batch,
+    two_workers: str,
+    monkeypatch: pytest.MonkeyPatch,
+    threads: int,
+    cut: int,
+    split: list[range],
+) -> None:
+    """Two workers, for any number of threads, any split of the frames, and where a run was taken up."""
+    from pipeline.farm.cluster import connected
+    from pipeline.farm.run import make_on
+    from pipeline.farm.tasks import THREADS
+
+    with connected(two_workers) as client:
+        client.run(os.environ.update, {THREADS: str(threads)})
+    if cut:
+        with monkeypatch.context() as patched, pytest.raises(Ended):
+            patched.setattr(stage, "run", ending_after(cut))
+            batch.make("simulate")
+    for frames in split:
+        make_on(two_workers, [batch], frames=frames)
+    make_on(two_workers, [batch])
+    tiny.assert_same(batch.experiment, undisturbed)
