@@ -30,13 +30,17 @@ def validate(
 ) -> int:
     """Compare the physics with closed forms and rod equations; exit code 1 outside a tolerance."""
     from pipeline.progress import track
-    from pipeline.validation import all_cases
+    from pipeline.validation import all_cases, all_laws
+    from pipeline.validation.case import MODELS
     from pipeline.validation.page import rows, summary, write_page
     from pipeline.validation.plots import draw, need_matplotlib
 
     cases = all_cases(quick, case)
     if not cases:
-        raise InputError(f"ringlet validate {case}: no such case")
+        listed = "; ".join(law.name for law in all_laws())
+        raise InputError(
+            f"ringlet validate {case}: no such case; there are {listed}; and the models {', '.join(MODELS)}"
+        )
     if plots or page:
         need_matplotlib()
     results = []

@@ -164,6 +164,11 @@ def _print_contents(found: dict[str, Any]) -> None:
         if isinstance(value, dict):
             print(f"{name}:")
             for key, item in value.items():
-                print(f"  {key:<28} {item}")
+                text = (
+                    ", ".join(f"{name} {each}" for name, each in item.items())
+                    if isinstance(item, dict)
+                    else item
+                )
+                print(f"  {key:<28} {text}")
         elif value is not None:
             print(f"{name + ':':<12} {value}")

@@ -17,7 +17,7 @@ from small_configs import ONE_LIGHT, SWATCH
 from pipeline import cache
 from pipeline.cli.base import print_json
 from pipeline.cli.main import call
-from pipeline.validation import Law, Outcome, Reading
+from pipeline.validation import Law, Outcome, Reading, all_laws
 
 ROOT = Path(__file__).parents[2]
 CONFIG = SWATCH + "[simulate]\nframes = 3\ntheta = 0.6\n" + ONE_LIGHT
@@ -207,6 +207,16 @@ def test_outputs_that_cannot_be_written_are_told(ringlet: Ringlet) -> None:
     _, err = ringlet("run", code=2)
     assert "outputs" in err
     assert "Not a directory" in err
+
+
+def test_an_unknown_law_is_answered_with_all_laws_and_models(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["validate", "cantilver"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(
+        "ringlet validate cantilver: no such case; there are cantilever; cantilever order;"
+    )
+    assert all(law.name in said for law in all_laws())
+    assert "kirchhoff, rotor, frenet, none" in said
 
 
 def test_a_full_disk_ends_a_run_with_one_message_and_nothing_lost(tmp_path: Path) -> None:

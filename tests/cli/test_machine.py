@@ -25,50 +25,58 @@ samples = 1
 """
 
 
-def fake(folder: Path, cgroup: str, **files: str) -> tuple[Path, Path]:
+def fake(folder: Path, group: str, files: dict[str, str]) -> tuple[Path, Path]:
     """A /proc and a /sys/fs/cgroup of our own."""
     proc, groups = folder / "proc", folder / "cgroup"
     (proc / "self").mkdir(parents=True)
     (proc / "meminfo").write_text(MEMINFO)
-    (proc / "self" / "cgroup").write_text(cgroup)
-    groups.mkdir()
+    (proc / "self" / "cgroup").write_text(group)
     for name, text in files.items():
-        path = groups / name.replace("__", "/").replace("_dot_", ".")
+        path = groups / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+        path.write_text(f"{text}\n")
     return proc, groups
 
 
 def test_without_limits_it_is_what_the_machine_has(tmp_path: Path) -> None:
-    proc, groups = fake(tmp_path, "")
-    assert machine.memory("groom", proc, groups) == machine.Room(8_192_000_000, "what the machine has free")
+    room = machine.memory("groom", *fake(tmp_path, "", {}))
+    assert room == machine.Room(8_192_000_000, "what the machine has free")
 
 
-def test_a_control_group_limits_those_below_it(tmp_path: Path) -> None:
-    proc, groups = fake(
-        tmp_path,
-        "0::/batch/job\n",
-        batch__memory_dot_max="3000000000\n",
-        batch__memory_dot_current="1000000000\n",
-        batch__memory_dot_stat="anon 5\ninactive_file 200000000\n",
-        batch__job__memory_dot_max="max\n",
-        batch__job__memory_dot_current="5\n",
-        batch__job__memory_dot_stat="inactive_file 0\n",
-    )
-    room = machine.memory("groom", proc, groups)
-    assert room.free == 2_200_000_000
-    assert room.limit.endswith("batch/memory.max is 3.00 GB")
+VERSION_2 = {
+    "batch/memory.max": "3000000000",
+    "batch/memory.current": "1000000000",
+    "batch/memory.stat": "anon 5\ninactive_file 200000000",
+    "batch/job/memory.max": "max",
+    "batch/job/memory.current": "5",
+    "batch/job/memory.stat": "inactive_file 0",
+}
+VERSION_1 = {
+    "memory/memory.limit_in_bytes": "2000000000",
+    "memory/memory.usage_in_bytes": "500000000",
+    "memory/memory.stat": "cache 9\ntotal_inactive_file 100000000",
+}
 
 
-def test_the_first_version_of_control_groups_counts_too(tmp_path: Path) -> None:
-    proc, groups = fake(
-        tmp_path,
-        "5:cpu:/\n4:memory:/not/visible/here\n",
-        memory__memory_dot_limit_in_bytes="2000000000\n",
-        memory__memory_dot_usage_in_bytes="500000000\n",
-        memory__memory_dot_stat="cache 9\ntotal_inactive_file 100000000\n",
-    )
-    assert machine.memory("groom", proc, groups).free == 1_600_000_000
+@pytest.mark.parametrize(
+    ("group", "files", "free", "limit"),
+    [
+        ("0::/batch/job\n", VERSION_2, 2_200_000_000, "batch/memory.max is 3.00 GB"),
+        (
+            "5:cpu:/\n4:memory:/not/here\n",
+            VERSION_1,
+            1_600_000_000,
+            "memory/memory.limit_in_bytes is 2.00 GB",
+        ),
+    ],
+    ids=["version 2", "version 1"],
+)
+def test_a_control_group_limits_those_below_it(
+    tmp_path: Path, group: str, files: dict[str, str], free: int, limit: str
+) -> None:
+    room = machine.memory("groom", *fake(tmp_path, group, files))
+    assert room.free == free
+    assert room.limit.endswith(limit)
 
 
 def run(folder: Path, *options: str, addresses: int) -> subprocess.CompletedProcess[str]:
