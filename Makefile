@@ -141,7 +141,7 @@ schema: env ## configs/schema.json, after a change of pipeline/config/schema/
 
 fuzz: env ## 100,000 damaged files for every reader and 2,000 calls of every kernel: hours; make fuzz FILES=1000
 	$(BIN)/python -m tests.hostile.boundary
-	$(BIN)/python -m tests.hostile.fuzz --files $(or $(FILES),100000) --keep outputs/fuzz
+	$(BIN)/python -m tests.hostile.fuzz --files $(or $(FILES),100000) --totals outputs/fuzz.json --keep outputs/fuzz
 
 coverage: env ## the tests once more, and which lines of Python they never ran; fails below 90 %
 	rm -f .coverage .coverage.*

@@ -1,5 +1,6 @@
 """Pictures in memory: (H, W, 3), uint8 or uint16 sRGB from PNG and the like, float32 linear from OpenEXR."""
 
+import io
 import zlib
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,8 @@ def load_picture(path: Path) -> Picture:
         deep = load_deep(path)
         if deep is not None:
             return deep
-        with Image.open(path) as image:
+        # From memory: of a file the library makes room for as many bytes as its chunks say that they have
+        with Image.open(io.BytesIO(path.read_bytes())) as image:
             if not image.has_transparency_data:
                 return np.asarray(image.convert("RGB"))
             over = image.convert("RGBA")
@@ -57,7 +59,7 @@ def renderer_of(path: Path) -> str | None:
         found = _exr_file(path).header().get(FINGERPRINT)
         return None if found is None else str(found)
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(path.read_bytes())) as image:
             found = image.info.get(FINGERPRINT)
     except (UnidentifiedImageError, OSError, SyntaxError):
         return None

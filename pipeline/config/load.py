@@ -137,7 +137,7 @@ def _read(path: Path, files: list[Path], roots: tuple[Path, ...]) -> Tree:
     parent = values.pop("extends", None)
     if parent is None:
         return own
-    where = f"{lines['extends',]}: extends"
+    where = own.label(("extends",))
     if not isinstance(parent, str):
         raise InputError(f'{where}: expected the name of a config, such as "default.toml"')
     parent = Path(os.path.normpath(path.parent / parent))

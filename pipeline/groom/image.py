@@ -1,5 +1,6 @@
 """Painted images, looked up by texture coordinates."""
 
+import io
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,8 @@ Points = NDArray[np.floating[Any]]
 def brightness(path: str) -> Values:
     """Brightness (H, W) of an image, 0 to 1. Raises InputError for a file that is none."""
     try:
-        with Image.open(Path(path)) as image:
+        # From memory: of a file the library makes room for as many bytes as its chunks say that they have
+        with Image.open(io.BytesIO(Path(path).read_bytes())) as image:
             deep = image.mode.startswith("I")
             values = np.asarray(image if deep else image.convert("L"), np.float64)
     except (OSError, ValueError, Image.DecompressionBombError) as error:

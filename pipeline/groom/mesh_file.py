@@ -1,6 +1,6 @@
 """Mesh files as they are: points, triangles, texture coordinates and what is painted on the points.
 
-OBJ, PLY, STL and VTP are read by VTK, other formats by meshio; in a process of its own, bounded in memory and time,
+OBJ, STL and VTP are read by VTK, PLY and OFF here (ply.py, off.py), other formats by meshio; in a process of its own, bounded in memory and time,
 because damaged files make readers crash or never end, and what they print is for programmers.
 """
 
@@ -9,7 +9,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
+from pipeline.groom.off import read_off
+from pipeline.groom.ply import read_ply
 
 Faces = NDArray[np.int64]
 
@@ -67,7 +68,7 @@ def read_apart(paths: Sequence[Path], painted: bool = False) -> Iterator[MeshFil
                 found = Path(folder) / f"{index}.npz"
                 if not found.is_file():
                     raise InputError(
-                        f"{path}: not a readable mesh; scene.head takes OBJ, PLY, STL, VTP or what meshio reads"
+                        f"{path}: not a readable mesh; scene.head takes OBJ, PLY, STL, VTP, OFF or what meshio reads"
                     )
                 yield _unpacked(found)
 
@@ -91,29 +92,33 @@ def _unpacked(path: Path) -> MeshFile:
 
 def _read(path: Path, painted: bool) -> MeshFile:
     """What the file has; anything may happen with a damaged one."""
-    if path.suffix.lower() in (".obj", ".ply", ".stl", ".vtp"):
+    ending = path.suffix.lower()
+    if ending in (".obj", ".stl", ".vtp"):
         return _read_vtk(path, painted)
+    if ending == ".ply":
+        ply = read_ply(path)
+        arrays = _painted(ply.numbers, len(ply.points)) if painted else {}
+        return MeshFile(ply.points, _triangles(ply.points, ply.polygons), ply.uv if painted else None, arrays)
+    if ending == ".off":
+        points, polygons = read_off(path)
+        return MeshFile(points, _triangles(points, polygons), None, {})
     import meshio
 
     mesh = meshio.read(path)
-    cells = [_fans(block.data) for block in mesh.cells if block.type in ("triangle", "quad", "polygon")]
-    faces = np.concatenate([np.zeros((0, 3), np.int64), *cells])
-    return MeshFile(np.asarray(mesh.points)[:, :3], faces, None, _painted(mesh.point_data) if painted else {})
+    points = np.asarray(mesh.points, np.float64)[:, :3]
+    polygons = [block.data for block in mesh.cells if block.type in ("triangle", "quad", "polygon")]
+    return MeshFile(
+        points, _triangles(points, polygons), None, _painted(mesh.point_data, len(points)) if painted else {}
+    )
 
 
 def _read_vtk(path: Path, painted: bool) -> MeshFile:
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkFiltersCore import vtkTriangleFilter
     from vtkmodules.vtkIOGeometry import vtkOBJReader, vtkSTLReader
-    from vtkmodules.vtkIOPLY import vtkPLYReader
     from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
-    readers: dict[str, Any] = {
-        ".obj": vtkOBJReader,
-        ".ply": vtkPLYReader,
-        ".stl": vtkSTLReader,
-        ".vtp": vtkXMLPolyDataReader,
-    }
+    readers: dict[str, Any] = {".obj": vtkOBJReader, ".stl": vtkSTLReader, ".vtp": vtkXMLPolyDataReader}
     reader, triangles = readers[path.suffix.lower()](), vtkTriangleFilter()
     reader.SetFileName(str(path))
     triangles.SetInputConnection(reader.GetOutputPort())
@@ -131,29 +136,17 @@ def _read_vtk(path: Path, painted: bool) -> MeshFile:
     arrays = {
         array.GetName(): vtk_to_numpy(array) for array in numbers if array is not None and array is not uv
     }
-    if path.suffix.lower() == ".ply":
-        arrays |= _ply_properties(path, len(points))
-    flat = None if uv is None else vtk_to_numpy(uv)[:, :2].astype(np.float32)
-    return MeshFile(points, faces, flat, _painted(arrays))
+    flat = None
+    if uv is not None and uv.GetNumberOfTuples() == len(points) and uv.GetNumberOfComponents() >= 2:
+        flat = vtk_to_numpy(uv)[:, :2].astype(np.float32)
+    return MeshFile(points, faces, flat, _painted(arrays, len(points)))
 
 
-def _ply_properties(path: Path, count: int) -> dict[str, NDArray[Any]]:
-    """What VTK does not read: single numbers on the points of a PLY file."""
-    import meshio
-
-    found: dict[str, NDArray[Any]] = {}
-    with suppress(
-        Exception, SystemExit
-    ):  # meshio reads fewer files than VTK does, and raises whatever it meets
-        found = meshio.read(path).point_data
-    return {name: values for name, values in found.items() if len(values) == count}
-
-
-def _painted(arrays: Mapping[str | None, NDArray[Any]]) -> dict[str, NDArray[np.float32]]:
-    """Arrays of one number a point; colours and vectors part by part, whole numbers of 8 or 16 bits from 0 to 1."""
+def _painted(arrays: Mapping[Any, NDArray[Any]], count: int) -> dict[str, NDArray[np.float32]]:
+    """Arrays of one number for each of `count` points; colours and vectors part by part, whole numbers of 8 or 16 bits from 0 to 1."""
     found: dict[str, NDArray[np.float32]] = {}
     for name, given in arrays.items():
-        if name is None or given.dtype.kind not in "iuf":
+        if not isinstance(name, str) or given.dtype.kind not in "iuf" or len(given) != count:
             continue
         whole = given.dtype in (np.uint8, np.uint16)
         values = given / np.iinfo(given.dtype).max if whole else given
@@ -165,10 +158,31 @@ def _painted(arrays: Mapping[str | None, NDArray[Any]]) -> dict[str, NDArray[np.
     return found
 
 
-def _fans(polygons: NDArray[Any]) -> Faces:
-    """Triangles of convex polygons of one size (N, K)."""
-    p = np.asarray(polygons, np.int64)
-    return np.concatenate([p[:, [0, k, k + 1]] for k in range(1, p.shape[1] - 1)])
+def _triangles(points: NDArray[np.float64], polygons: Sequence[NDArray[Any]]) -> Faces:
+    """Triangles (T, 3) of runs of polygons (N, K); those of more points, which need not be convex, are cut by VTK."""
+    runs = [np.ascontiguousarray(run, np.int64) for run in polygons if run.shape[1] >= 3]
+    flat = np.concatenate([np.zeros(0, np.int64), *(run.ravel() for run in runs)])
+    if len(flat) and (flat.min() < 0 or flat.max() >= len(points)):
+        return flat[: len(flat) // 3 * 3].reshape(-1, 3)  # refused where indices are checked
+    if all(run.shape[1] == 3 for run in runs):
+        return flat.reshape(-1, 3)
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+    from vtkmodules.vtkFiltersCore import vtkTriangleFilter
+
+    sizes = np.concatenate([np.full(len(run), run.shape[1]) for run in runs])
+    given, cells, mesh, cut = vtkPoints(), vtkCellArray(), vtkPolyData(), vtkTriangleFilter()
+    given.SetData(numpy_to_vtk(points, deep=True))
+    offsets = numpy_to_vtkIdTypeArray(np.append(0, np.cumsum(sizes)), deep=True)
+    cells.SetData(offsets, numpy_to_vtkIdTypeArray(flat, deep=True))
+    mesh.SetPoints(given)
+    mesh.SetPolys(cells)
+    cut.SetInputData(mesh)
+    cut.Update()
+    return np.asarray(
+        vtk_to_numpy(cut.GetOutput().GetPolys().GetConnectivityArray()).reshape(-1, 3), np.int64
+    )
 
 
 def _main(folder: Path, painted: bool, paths: list[Path]) -> None:

@@ -95,6 +95,8 @@ def test_overrides_need_no_quotes_and_reach_into_lists(tmp_path: Path) -> None:
             "[groom]\nyoung_modulus = 5",
             "x.toml:2: groom.young_modulus: unknown key; did you mean 'simulate.hair.young_modulus'?",
         ),
+        ("[scefe.camera]\nup = 1", "x.toml:1: scefe: unknown key; did you mean 'scene'?"),
+        ("extends.x = 1", "x.toml:1: extends: expected the name of a config"),
         ("[grooom]\nstrands = 5", "x.toml:1: grooom: unknown key; did you mean 'groom'?"),
         (
             '[simulate.hair]\nyoung_modulus = "4 GPA"',

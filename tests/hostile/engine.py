@@ -8,9 +8,9 @@ import faulthandler
 import os
 import resource
 import signal
-from collections import Counter
+import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
@@ -51,16 +51,42 @@ class Target:
         return len(data)
 
 
-def fuzz(target: Target, numbers: range, seed: int, folder: Path, keep: Path | None = None) -> dict[str, int]:
-    """Damage and read files of these numbers; what came out. Those that broke something are kept in a folder."""
-    path, outcomes = folder / f"damaged{target.ending}", Counter[str]()
-    for number, outcome in zip(numbers, watched(target, path, seed, numbers), strict=True):
-        outcomes[outcome] += 1
+@dataclass
+class Tally:
+    """What came of files: how many of each outcome, and the most that one of them took."""
+
+    outcomes: dict[str, int] = field(default_factory=dict)
+    seconds: float = 0.0
+    """Processor time."""
+    kilobytes: int = 0
+    """That a process of many files grew by, its largest one and those before it together."""
+
+    @property
+    def files(self) -> int:
+        return sum(self.outcomes.values())
+
+    def add(self, outcome: str, seconds: float, kilobytes: int) -> None:
+        self.outcomes[outcome] = self.outcomes.get(outcome, 0) + 1
+        self.seconds, self.kilobytes = max(self.seconds, seconds), max(self.kilobytes, kilobytes)
+
+
+def fuzz(
+    target: Target,
+    numbers: range,
+    seed: int,
+    folder: Path,
+    keep: Path | None = None,
+    total: Tally | None = None,
+) -> Tally:
+    """Damage and read files of these numbers; `total` with what came out. Those that broke something are kept in a folder."""
+    path, total = folder / f"damaged{target.ending}", total or Tally()
+    for number, (outcome, *cost) in zip(numbers, watched(target, path, seed, numbers), strict=True):
+        total.add(outcome, *cost)
         if keep and not held(outcome):
             keep.mkdir(exist_ok=True, parents=True)
             target.make(keep / f"{target.name}-{number}{target.ending}", seed, number)
     path.unlink(missing_ok=True)
-    return dict(outcomes)
+    return total
 
 
 def held(outcome: str) -> bool:
@@ -79,8 +105,8 @@ def judged(target: Target, read: Callable[[Path], object], path: Path) -> str:
     return READ if target.fits(found) else "what was read does not fit together"
 
 
-def watched(target: Target, path: Path, seed: int, numbers: range) -> Iterator[str]:
-    """What comes of files of these numbers; only those of libraries ought to end the process that reads them."""
+def watched(target: Target, path: Path, seed: int, numbers: range) -> Iterator[tuple[str, float, int]]:
+    """What comes of files of these numbers and what that costs, as a `Tally` takes it; only those of libraries ought to end the process that reads them."""
     while numbers:
         batch = numbers[:BATCH]
         reading, writing = os.pipe()
@@ -97,15 +123,16 @@ def watched(target: Target, path: Path, seed: int, numbers: range) -> Iterator[s
         with os.fdopen(reading) as outcomes:
             told = outcomes.read().splitlines()
         _, status = os.waitpid(child, 0)
-        for number, outcome in zip(batch, told, strict=False):
+        for number, line in zip(batch, told, strict=False):
+            outcome, seconds, kilobytes = line.split("\t")
             if not held(outcome):
                 target.make(path, seed, number)
                 outcome = _told(target, path, outcome)
-            yield outcome
+            yield outcome, float(seconds), int(kilobytes)
         code = os.waitstatus_to_exitcode(status)
         if code:
             target.make(path, seed, batch[len(told)])
-            yield _told(target, path, signal.Signals(-code).name if code < 0 else f"exit code {code}")
+            yield _told(target, path, signal.Signals(-code).name if code < 0 else f"exit code {code}"), 0.0, 0
         numbers = numbers[len(told) + bool(code) :]
 
 
@@ -119,12 +146,16 @@ def _work(target: Target, path: Path, seed: int, numbers: range, outcomes: IO[st
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     begin = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + MEMORY
+    resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for number in numbers:
         size = target.make(path, seed, number)
         resource.setrlimit(resource.RLIMIT_AS, (begin + MEMORY_PER_BYTE * size, resource.RLIM_INFINITY))
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
         signal.setitimer(signal.ITIMER_REAL, PATIENCE * SECONDS)
-        outcomes.write(judged(target, target.read, path).replace("\n", " ") + "\n")
+        start = time.process_time()
+        outcome = " ".join(judged(target, target.read, path).split())
+        grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - resident
+        outcomes.write(f"{outcome}\t{time.process_time() - start:.3f}\t{grown}\n")
         outcomes.flush()
 
 

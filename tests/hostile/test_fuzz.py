@@ -1,17 +1,22 @@
 """Damaged files, as many as seconds allow; `python -m tests.hostile.fuzz` reads 100,000 for every reader."""
 
+import io
 import json
 import os
+import struct
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from pipeline.errors import InputError
-from tests.hostile import engine
+from tests.hostile import engine, readers
 
 ROOT = Path(__file__).parents[2]
 QUICK = (
@@ -54,6 +59,21 @@ HARM: dict[str, Callable[[], object]] = {  # what a reader may do, and how the f
 }
 
 
+def test_a_picture_takes_no_memory_that_only_its_header_asks_for(tmp_path: Path) -> None:
+    """A PNG file whose pixels end early, in a chunk that says it has 2 GB."""
+    to = io.BytesIO()
+    Image.fromarray(np.zeros((24, 20), np.uint8)).save(to, "PNG")
+    data = to.getvalue()
+    at = data.index(b"IDAT")
+    short = data[: at - 4] + struct.pack(">I", 0x7FFFFFFF) + data[at:]
+    for reader in ("painted", "picture"):
+        target = next(t for t in readers.targets(tmp_path) if t.name == reader)
+        outcomes = engine.fuzz(replace(target, whole=[short], damage=lambda d, _: d), range(1), 0, tmp_path)
+        print(reader, outcomes)
+        assert engine.held(*outcomes.outcomes)
+        assert outcomes.kilobytes < 20 << 10
+
+
 def refuse(message: str) -> None:
     raise InputError(message)
 
@@ -70,7 +90,7 @@ def test_the_fuzzer_notices_a_reader_that_breaks(
     target = engine.Target(
         "broken", ".x", [bytes(range(200)) * 2], broken, fits=lambda found: found is not None
     )
-    outcomes = engine.fuzz(target, range(12), 3, tmp_path)
+    outcomes = engine.fuzz(target, range(12), 3, tmp_path).outcomes
     print(outcomes)
     assert outcomes[named] >= 1
     assert outcomes.get(engine.READ, 0) >= 1
