@@ -29,7 +29,7 @@ _NEAR = 45  # of a place that is only proved to be far from the head
 def flops_per_point_step(solves: float, rounds: float) -> float:
     """Operations for each point and step, with so many solves a step and rounds of relaxation.
 
-    Contacts count as places far from the head, which is the least that they cost.
+    Contacts count as places far from the head, which is the least that they cost, and rows that are dropped not at all.
     """
     eliminated = solves * sum(_ELIMINATE.values())
     relaxed = (rounds + 1) * _LENGTHS["strain"] + rounds * _LENGTHS["tridiagonal step"]
