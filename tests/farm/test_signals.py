@@ -45,7 +45,7 @@ def experiment(tmp_path: Path) -> cache.Experiment:
 @pytest.fixture
 def start(experiment: cache.Experiment, tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
     """Start ringlet as a shell does, in a group of its own; frames take a moment there."""
-    groups: list[int] = []
+    started: list[subprocess.Popen[str]] = []
     slow = {
         "PYTHONPATH": str(ROOT),
         "RINGLET_TEST_LOG": str(tmp_path / "frames.log"),
@@ -63,13 +63,15 @@ def start(experiment: cache.Experiment, tmp_path: Path) -> Iterator[Callable[...
             text=True,
             start_new_session=True,
         )
-        groups.append(process.pid)
+        started.append(process)
         return process
 
     yield go
-    for group in groups:
+    for process in started:
         with suppress(ProcessLookupError):
-            os.killpg(group, signal.SIGKILL)
+            os.killpg(process.pid, signal.SIGKILL)
+        with process:  # its pipe is closed, and it is waited for
+            pass
 
 
 def members(group: int) -> list[int]:
