@@ -145,9 +145,8 @@ fuzz: env ## 100,000 damaged files for every reader and 2,000 calls of every ker
 
 coverage: env ## the tests once more, and which lines of Python they never ran; fails below 90 %
 	rm -f .coverage .coverage.*
-	$(BIN)/coverage run -m pytest -n 2 --dist loadfile
-	$(BIN)/coverage combine -q
-	$(BIN)/coverage report
+	$(BIN)/coverage run -m pytest -n 2 --dist loadfile; tests=$$?; \
+	  $(BIN)/coverage combine -q && $(BIN)/coverage report && exit $$tests
 
 wheel: env ## a wheel for this Python, installed and tried in an environment of its own
 	.ci/wheel dist

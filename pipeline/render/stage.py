@@ -81,7 +81,7 @@ class Frames:
                 shots = list(passes(self.config, self.path, number))
                 name, wide = self.renderer.shape(moments.at(number, shots[0].back), shots[0].view)
                 if name != shape:
-                    say("render", f"strands are {name}, {wide:.2g} px wide, from frame {number} on")
+                    say("render", f"strands are drawn as {name}, {wide:.2g} px wide, from frame {number} on")
                     shape = name
                 seen = ((moments.at(number, shot.back), shot.view) for shot in shots)
                 linear, layers = _mean_of(self.renderer, seen)
