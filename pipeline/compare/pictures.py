@@ -1,7 +1,5 @@
 """Pictures in memory: (H, W, 3), uint8 or uint16 sRGB from PNG and the like, float32 linear from OpenEXR."""
 
-import io
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.compare.deep import load_deep
+from pipeline.compare.opened import opened
 from pipeline.errors import InputError
 
 Picture = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.float32]
@@ -26,42 +25,34 @@ def load_picture(path: Path) -> Picture:
     """
     if path.suffix.lower() == ".exr":
         return _load_exr(path)
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
         deep = load_deep(path)
         if deep is not None:
             return deep
-        # From memory: of a file the library makes room for as many bytes as its chunks say that they have
-        with Image.open(io.BytesIO(path.read_bytes())) as image:
+        with opened(path) as image:
             if not image.has_transparency_data:
                 return np.asarray(image.convert("RGB"))
             over = image.convert("RGBA")
             return np.asarray(
                 Image.alpha_composite(Image.new("RGBA", over.size, _BEHIND), over).convert("RGB")
             )
-    except (
-        UnidentifiedImageError,
-        Image.DecompressionBombError,
-        OSError,
-        SyntaxError,
-        ValueError,
-        zlib.error,
-    ) as error:
+    except MemoryError:
+        raise
+    except Exception as error:
         raise InputError(f"{path}: not a readable picture ({error})") from error
 
 
 def renderer_of(path: Path) -> str | None:
     """The fingerprint that the renderer wrote into a picture: what pixels depend on besides the config; None without."""
-    from PIL import Image, UnidentifiedImageError
-
     if path.suffix.lower() == ".exr":
         found = _exr_file(path).header().get(FINGERPRINT)
         return None if found is None else str(found)
     try:
-        with Image.open(io.BytesIO(path.read_bytes())) as image:
+        with opened(path) as image:
             found = image.info.get(FINGERPRINT)
-    except (UnidentifiedImageError, OSError, SyntaxError):
+    except Exception:  # noqa: BLE001, whatever the library raises
         return None
     return None if found is None else str(found)
 

@@ -1,14 +1,13 @@
 """Painted images, looked up by texture coordinates."""
 
-import io
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
+from pipeline.compare.opened import opened
 from pipeline.errors import InputError
 
 Values = NDArray[np.float64]
@@ -19,11 +18,12 @@ Points = NDArray[np.floating[Any]]
 def brightness(path: str) -> Values:
     """Brightness (H, W) of an image, 0 to 1. Raises InputError for a file that is none."""
     try:
-        # From memory: of a file the library makes room for as many bytes as its chunks say that they have
-        with Image.open(io.BytesIO(Path(path).read_bytes())) as image:
+        with opened(Path(path)) as image:
             deep = image.mode.startswith("I")
             values = np.asarray(image if deep else image.convert("L"), np.float64)
-    except (OSError, ValueError, Image.DecompressionBombError) as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # noqa: BLE001, whatever the library raises
         raise InputError(f"{path}: cannot be read as an image ({error})") from None
     return values / (65535.0 if deep else 255.0)
 

@@ -1,5 +1,6 @@
 """Meshes in OFF files: points and polygons; colours and normals behind them are passed over.
 
+Own code, because meshio 5.3 refuses valid files: polygons that are no triangles, and comments behind what it expects.
 Source: Geomview's manual, "OFF Files" (The Geometry Center, 1991 to 1996), the text form.
 """
 

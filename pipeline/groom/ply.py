@@ -2,6 +2,9 @@
 
 Numbers of a text are taken as doubles one after the other, so that both kinds are rows of memory. Rows with lists come
 in runs of one shape; most files are a single run.
+Own code, because libraries get valid files wrong (test_mesh_files.py): meshio 5.3 reads bytes of binary files as signed
+and unscaled (a colour of 255 is -1), and loses all numbers where faces have other numbers; VTK 9 loses the faces behind
+an element that is neither.
 Source: Turk, "The PLY Polygon File Format" (1994).
 """
 

@@ -59,19 +59,35 @@ HARM: dict[str, Callable[[], object]] = {  # what a reader may do, and how the f
 }
 
 
-def test_a_picture_takes_no_memory_that_only_its_header_asks_for(tmp_path: Path) -> None:
-    """A PNG file whose pixels end early, in a chunk that says it has 2 GB."""
+def image(kind: str) -> bytes:
     to = io.BytesIO()
-    Image.fromarray(np.zeros((24, 20), np.uint8)).save(to, "PNG")
-    data = to.getvalue()
-    at = data.index(b"IDAT")
-    short = data[: at - 4] + struct.pack(">I", 0x7FFFFFFF) + data[at:]
-    for reader in ("painted", "picture"):
-        target = next(t for t in readers.targets(tmp_path) if t.name == reader)
-        outcomes = engine.fuzz(replace(target, whole=[short], damage=lambda d, _: d), range(1), 0, tmp_path)
-        print(reader, outcomes)
-        assert engine.held(*outcomes.outcomes)
-        assert outcomes.kilobytes < 20 << 10
+    Image.fromarray(np.arange(480, dtype=np.uint8).reshape(24, 20)).save(to, kind)
+    return to.getvalue()
+
+
+def with_bytes(data: bytes, at: int, new: bytes) -> bytes:
+    return data[:at] + new + data[at + len(new) :]
+
+
+PNG, BMP = image("PNG"), image("BMP")
+PICTURES = {
+    "a chunk of 2 GB": with_bytes(PNG, PNG.index(b"IDAT") - 4, struct.pack(">I", 0x7FFFFFFF)),
+    "a chunk of no kind": with_bytes(PNG, PNG.index(b"IDAT"), b"\xff\0"),
+    "more pixels than bytes can stand for": with_bytes(BMP, 18, struct.pack("<2i", 9000, 9000)),
+}
+
+
+@pytest.mark.parametrize("what", PICTURES)
+@pytest.mark.parametrize("reader", ["painted", "picture"])
+def test_a_picture_takes_no_memory_that_only_its_header_asks_for(
+    tmp_path: Path, reader: str, what: str
+) -> None:
+    target = next(t for t in readers.targets(tmp_path) if t.name == reader)
+    target = replace(target, whole=[PICTURES[what]], damage=lambda data, _: data)
+    outcomes = engine.fuzz(target, range(1), 0, tmp_path)
+    print(outcomes)
+    assert engine.held(*outcomes.outcomes)
+    assert outcomes.kilobytes < 20 << 10
 
 
 def refuse(message: str) -> None:
