@@ -23,11 +23,11 @@ def load_picture(path: Path) -> Picture:
 
     OpenEXR needs the extra `exr`; of its channels R, G and B are read, or Y.
     """
-    if path.suffix.lower() == ".exr":
-        return _load_exr(path)
     from PIL import Image
 
     try:
+        if path.suffix.lower() == ".exr":
+            return _load_exr(path)
         deep = load_deep(path)
         if deep is not None:
             return deep
@@ -38,7 +38,7 @@ def load_picture(path: Path) -> Picture:
             return np.asarray(
                 Image.alpha_composite(Image.new("RGBA", over.size, _BEHIND), over).convert("RGB")
             )
-    except MemoryError:
+    except (InputError, MemoryError):
         raise
     except Exception as error:
         raise InputError(f"{path}: not a readable picture ({error})") from error

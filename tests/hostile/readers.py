@@ -2,6 +2,8 @@
 
 import io
 import struct
+import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from unittest.mock import patch
@@ -184,7 +186,26 @@ def _pictures() -> list[Target]:
         Target("painted", ".png", png, _painted),
         Target("painted-other", ".img", other, _painted),
         Target("picture", ".png", png, load_picture),
+        *_deep(rng),
     ]
+
+
+def _deep(rng: Rng) -> list[Target]:
+    """The reader of OpenEXR files, where its library is there."""
+    try:
+        import OpenEXR
+    except ModuleNotFoundError as error:
+        print(f"without {error.name}", file=sys.stderr)
+        return []
+    whole = []
+    for kind in (np.float16, np.float32):
+        with tempfile.TemporaryDirectory() as name:
+            path = Path(name) / "a.exr"
+            header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+            channels = {channel: rng.random((24, 20)).astype(kind) for channel in "RGB"}
+            OpenEXR.File(header, channels).write(str(path))
+            whole.append(path.read_bytes())
+    return [Target("exr", ".exr", whole, load_picture)]
 
 
 def _painted(path: Path) -> object:

@@ -31,6 +31,7 @@ QUICK = (
     "parting",
     "paint",
     "picture",
+    "exr",
     "cache",
 )
 
