@@ -96,7 +96,7 @@ sweep: $(if $(NAME),outputs/$(NAME)/sweep) ## all experiments of CONFIG's [sweep
 
 # --- Checks --------------------------------------------------------------------------------------
 
-.PHONY: test lint validate interpolation performance gallery docs site images approve bench sanitize schema fuzz coverage wheel
+.PHONY: test lint validate interpolation performance gallery pathtracer docs site images approve bench sanitize schema fuzz coverage wheel
 test: env ## all tests
 	$(BIN)/pytest -n 2 --dist loadfile
 
@@ -118,6 +118,9 @@ performance: env ## all benchmarks, on an idle machine: eight minutes; writes do
 gallery: env ## every style and every operator, rendered; writes docs/gallery.md and docs/operators.md
 	$(BIN)/python docs/gallery.py
 	$(BIN)/python docs/operators.py
+
+pathtracer: env ## the same hair by a path tracer and by ringlet, minutes; needs Mitsuba; writes docs/pathtracer.md
+	$(BIN)/python docs/pathtracer.py
 
 docs: gallery site ## the site, with every style and operator rendered anew
 

@@ -89,6 +89,7 @@ class Frames:
                     writing.result()
                 texts = {"geometry": name, "fingerprint": fingerprint(self.renderer.target)}
                 writing = pool.submit(self._write, number, linear, layers, texts)
+                del linear, layers  # not kept beside the next frame's
                 bar.advance()
             if writing is not None:
                 writing.result()
