@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.errors import FAILED
+from pipeline.errors import FAILED, WRONG_INPUT, InputError
 
 _RINGLET = (sys.executable, "-m", "pipeline")
 
@@ -40,9 +40,12 @@ class Run:
 
 
 def figures(*words: object) -> dict[str, Any]:
-    """What `ringlet bench` measures. Raises CalledProcessError when it cannot."""
-    command = [*_RINGLET, "bench", *map(str, words), "--json"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    """What `ringlet bench` measures. Raises InputError or CalledProcessError when it cannot."""
+    done = subprocess.run(
+        [*_RINGLET, "bench", *map(str, words), "--json"], check=False, capture_output=True, text=True
+    )
+    if done.returncode == WRONG_INPUT:
+        raise InputError(done.stderr.strip())
     if done.returncode != FAILED:  # it has measured something that is not as it should be
         done.check_returncode()
     found: dict[str, Any] = json.loads(done.stdout)
@@ -50,7 +53,7 @@ def figures(*words: object) -> dict[str, Any]:
 
 
 def timed(verb: str, config: Path, *options: object) -> Run:
-    """Run, groom or sweep a config, its outputs in a folder that is gone afterwards. Raises CalledProcessError."""
+    """Run, groom or sweep a config, its outputs in a folder that is gone afterwards. Raises InputError or CalledProcessError."""
     with tempfile.TemporaryDirectory() as folder:
         command = [
             *_RINGLET,
@@ -63,6 +66,10 @@ def timed(verb: str, config: Path, *options: object) -> Run:
             *map(str, options),
         ]
         start = time.perf_counter()
-        said = subprocess.run(command, check=True, capture_output=True, text=True).stderr
+        done = subprocess.run(command, check=False, capture_output=True, text=True)
         seconds = time.perf_counter() - start
-    return Run(seconds, tuple(json.loads(line) for line in said.splitlines() if line.startswith("{")))
+    records = tuple(json.loads(line) for line in done.stderr.splitlines() if line.startswith("{"))
+    if done.returncode == WRONG_INPUT:
+        raise InputError.joined(r["text"] for r in records if r["event"] == "error")
+    done.check_returncode()
+    return Run(seconds, records)

@@ -32,14 +32,21 @@ def status(
 ) -> None:
     """Tell which stages are fresh, which value made the others stale, who is at work, and what the disk holds."""
     from pipeline.batch.stages import Batch
-    from pipeline.cli.status import examine, lines
+    from pipeline.batch.sweep import batch_of
+    from pipeline.cli.status import examine, examine_sweep, lines, sweep_lines
+    from pipeline.config.sweep import load_sweep
 
     loaded = load_config(config, settings)
     found = examine(Batch(loaded.config, experiment_of(loaded, outputs)))
+    said = lines(found)
+    if loaded.config.sweep is not None:
+        runs = load_sweep(config, settings).runs
+        found["sweep"] = examine_sweep([batch_of(run, outputs) for run in runs])
+        said += sweep_lines(found["sweep"])
     if json:
         print_json(found)
     else:
-        print(*lines(found), sep="\n")
+        print(*said, sep="\n")
 
 
 @app.command(group=LOOK_GROUP, sort_key=2)

@@ -1,6 +1,7 @@
 """Where an experiment stands: what is fresh and why the rest is not, who works on it, what it takes on the disk."""
 
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from pipeline.batch.stages import Batch
 from pipeline.cache.atomic import stale_files
 from pipeline.config import STAGES
 
+_EXPERIMENTS_SHOWN = 8
 _PROGRESS = ("unit", "done", "total", "rate", "left_s")
 
 
@@ -28,6 +30,16 @@ def examine(batch: Batch) -> dict[str, Any]:
         },
         "last_run": _last_run(records),
     }
+
+
+def examine_sweep(batches: Sequence[Batch]) -> list[dict[str, Any]]:
+    """Of every experiment of a sweep, which stage is the first that is not fresh."""
+    found = []
+    for batch in batches:
+        stale = next((state for state in batch.states() if not state.fresh), None)
+        reason = f"{stale.name}: {stale.reason}" if stale else ""
+        found.append({"name": batch.config.name, "complete": stale is None, "reason": reason})
+    return found
 
 
 def _stage(batch: Batch, stage: str, records: list[log.Record]) -> dict[str, Any]:
@@ -123,6 +135,16 @@ def lines(found: dict[str, Any]) -> list[str]:
         said.append(f"{'last run':<12} {run['began'][:19]} UTC, {end}")
         if run["code"]:
             said.append(f"{'':<12} {run['end'].splitlines()[-1]}")
+    return said
+
+
+def sweep_lines(found: Sequence[dict[str, Any]]) -> list[str]:
+    """The experiments of a sweep for people: how many are complete, and the first that are not."""
+    open_ = [each for each in found if not each["complete"]]
+    said = [f"{'sweep':<12} {len(found) - len(open_)} of {len(found)} experiments complete"]
+    said += [f"{'':<12} {each['name']}: {each['reason']}" for each in open_[:_EXPERIMENTS_SHOWN]]
+    if len(open_) > _EXPERIMENTS_SHOWN:
+        said.append(f"{'':<12} and {len(open_) - _EXPERIMENTS_SHOWN} more")
     return said
 
 

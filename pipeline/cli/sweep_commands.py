@@ -46,7 +46,7 @@ def sweep(
 ) -> None:
     """Run every experiment of a config's [sweep]; stages that its values do not touch are made once.
 
-    The table and the page are of whole experiments: with --until or --frames, where others do the rest, they wait.
+    With --until or --frames, which make parts of experiments, there is neither table nor page.
     """
     from pipeline.batch.sweep import batch_of, chosen, make_all
     from pipeline.batch.table import write_table

@@ -13,6 +13,7 @@ from pipeline.bench import command, render_table
 from pipeline.bench.page import write_page
 from pipeline.bench.performance import Sizes, measure, sections
 from pipeline.cli.main import call
+from pipeline.errors import InputError
 
 TINY = Sizes(16, 32, 2000, 300, 10_000, whole=False, frames=2, pixels=32, experiments=2)
 CONFIG = """\
@@ -99,3 +100,8 @@ def test_workers_and_one_process_draw_on_the_same_processors(found: tuple[dict[s
     assert farm["threads"] == max(1, farm["processors"] // farm["workers"])
     assert farm["speed_up"] == pytest.approx(farm["seconds_one"] / farm["seconds_workers"], rel=0.05)
     assert min(farm[f"cpu_ms_per_frame_{who}"] for who in ("one", "held", "workers")) > 0
+
+
+def test_what_is_wrong_with_a_config_is_told_as_such(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such config"):
+        command.timed("groom", tmp_path / "nowhere.toml")

@@ -140,3 +140,23 @@ def test_a_damaged_file_is_not_taken_over(sweep: Sweep) -> None:
     path.write_bytes(data[:-50])
     ran, _ = sweep("--only", "*2GPa,irradiance=2")
     assert ran == ["simulate", "render 1 2"]
+
+
+def test_status_tells_which_experiments_are_complete(sweep: Sweep) -> None:
+    sweep("--only", "*2GPa,irradiance=1")
+    status = ["status", str(sweep.config), "--outputs", str(sweep.outputs)]
+    assert call(status) == 0
+    printed = sweep.capsys.readouterr().out
+    assert "1 of 4 experiments complete" in printed
+    assert "x@young_modulus=4GPa,irradiance=1: groom: not made yet" in printed
+    sweep()
+    assert call([*status, "--json"]) == 0
+    assert [each["complete"] for each in json.loads(sweep.capsys.readouterr().out)["sweep"]] == 4 * [True]
+
+
+def test_a_part_of_a_sweep_writes_no_table(sweep: Sweep) -> None:
+    ran, _ = sweep("--only", "*2GPa,irradiance=1", "--until", "simulate")
+    assert ran == ["groom", "simulate"]
+    assert sweep("--only", "*2GPa,irradiance=1", "--frames", "2")[0] == ["interpolate", "render 2"]
+    assert not (sweep.outputs / "x/sweep.json").exists()
+    assert "expected a range within 1-2" in sweep("--frames", "3", code=2)[1]
