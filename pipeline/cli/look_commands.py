@@ -171,11 +171,9 @@ def _print_contents(found: dict[str, Any]) -> None:
         if isinstance(value, dict):
             print(f"{name}:")
             for key, item in value.items():
-                text = (
-                    ", ".join(f"{name} {each}" for name, each in item.items())
-                    if isinstance(item, dict)
-                    else item
+                several = isinstance(item, dict)
+                print(
+                    f"  {key:<28} {', '.join(f'{part} {each}' for part, each in item.items()) if several else item}"
                 )
-                print(f"  {key:<28} {text}")
         elif value is not None:
             print(f"{name + ':':<12} {value}")
