@@ -732,7 +732,8 @@ class FibreTables:
         Args:
             lobes: (A, T, H, 8) float32 over absorption (uniform in its root), theta_d in [0, pi/2], phi in [0, pi]:
                 N_R, N_TT, N_TRT, N_rest [1/rad], their means over a half circle G_R, G_TT, G_TRT + G_rest, 0.
-            sums: (A, T, 8) float32: a_f, a_b, mean of N over the circle for R, TT, TRT + rest, v_f, v_b, 0.
+            sums: (A, T, 8) float32: a_f, a_b, s, m (see shade.hpp), twice the mean of N over the circle
+                for TT and TRT + rest, v_f, v_b.
             pigment: (K, J, 4) float32 over the place from root to tip and variation u in [0, 1]: absorption R, G, B
                 [1/radius], factor on the variances.
             variance: (4,) float32, v of the four lobes.

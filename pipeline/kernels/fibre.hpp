@@ -24,7 +24,7 @@ struct Lobe {
 
 struct FibreTables {
     const float *lobes; // (A, T, H, 8): N_R, N_TT, N_TRT, N_rest, G_R, G_TT, G_TRT + G_rest, 0
-    const float *sums;  // (A, T, 8): a_f, a_b, circle means of N for R, TT, TRT + rest, v_f, v_b, 0
+    const float *sums;  // (A, T, 8): a_f, a_b, s, m, twice the circle means of N for TT, TRT + rest, v_f, v_b; see shade.hpp
     const float *pigment; // (K, J, 4): absorption R, G, B [1/radius], variance over `variance`; from root to tip, and by u
     int A, T, H, K, J;
     float variance[4], absorption_max;

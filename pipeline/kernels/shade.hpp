@@ -2,15 +2,18 @@
 //
 // With n fibres on the way to the light (the mean of a Poisson count) and n_b behind the point, per channel,
 //
-//     L = E V { e^-n sum M N + (I - e^-n) sum M(v + v_I) G(phi) + q c J sum M(v + v_J) G(pi - phi) } + environment,
+//     L = E V { e^-n sum M N + D sum M(v + v_D) G(phi) + c U sum M(v + v_U) G(pi - phi) } + environment,
 //
-// where I and J are the light that goes down and comes back in a two-flux layer of fibres with forward and backward
-// albedo a_f and a_b: g = 1 - a_f, k^2 = g^2 - a_b^2, T = n + n_b,
+// where D and U are the fluence of scattered light that goes down and that comes back up in a layer of fibres. Of direct light
+// a_f is scattered on and a_b back; of scattered light, which comes from all sides, s back and a_f + a_b - s = 1 - g on. It
+// goes aslant, and passes m times as many fibres as the direct light from which it stems:
 //
-//     I = [(k+g) e^-kn + (k-g) e^-k(2T-n)] / den,  J = a_b [e^-kn - e^-k(2T-n)] / den,  den = (k+g) + (k-g) e^-2kT.
+//     D' = m (-g D + s U + a_f e^-n),  -U' = m (-g U + s D + a_b e^-n),  D(0) = 0,  U(n + n_b) = 0.
 //
-// Ours; a variant of Zinke et al., Dual Scattering Approximation for Fast Multiple Scattering in Hair, SIGGRAPH 2008,
-// which counts hits along the ray and truncates the layer's series. q = pi/2 turns flux into radiance, c = max(0.2, N.L).
+// m k, k^2 = g^2 - s^2, is the rate at which light fades deep in the layer; pipeline/render/fibre.py finds it without two
+// streams. `test_scattered_light_is_that_of_a_layer_of_fibres` holds D and U against random walks. Ours; a variant of Zinke et al., Dual Scattering Approximation for Fast Multiple Scattering in Hair, SIGGRAPH
+// 2008, which counts hits along the ray and truncates the layer's series. Kubelka and Munk (1931) for the two streams, with
+// a collimated source. c = max(0.2, N.L).
 #pragma once
 
 #include "illumination.hpp"
@@ -104,17 +107,25 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     return p;
 }
 
-/// Forward, backward and twice scattered light in one channel.
+/// Fluence of scattered light in one channel.
 struct Flux {
-    Floats down, back; // I with the direct light, J
+    Floats down, up;
 };
 
-RINGLET_INLINE Flux two_flux(Floats a_f, Floats a_b, Floats n, Floats behind) {
-    const Floats g = 1.0f - a_f, k = square_root<float>(maximum<float>(g * g - a_b * a_b, splat(1e-6f)));
-    const Floats there = exponential(-k * n), behind_twice = exponential(-2.0f * k * behind);
-    const Floats returned = there * behind_twice; // e^-k(2T-n)
-    const Floats scale = 1.0f / ((k + g) + (k - g) * there * returned);
-    return {((k + g) * there + (k - g) * returned) * scale, a_b * (there - returned) * scale};
+/// At the depth n of n + n_b; `through` and `past` are e^-n and e^-n_b.
+RINGLET_INLINE Flux two_flux(const Floats sums[8], Floats n, Floats behind, Floats through, Floats past) {
+    const Floats a_f = sums[0], a_b = sums[1], s = sums[2], m = sums[3], g = 1.0f - a_f - a_b + s;
+    const Floats k = square_root<float>(maximum<float>(g * g - s * s, splat(1e-6f))), ratio = s / (g + k);
+    // Where scattered light fades just as the direct light does, the solution has another form, and this one a pole
+    Floats rate = m * k;
+    const Floats off = rate - 1.0f;
+    rate = off * off > 2.5e-5f ? rate : (off < 0.0f ? splat(0.995f) : splat(1.005f));
+    const Floats fade = 1.0f + m * g;
+    const Floats P = m * (m * s * a_b + a_f * fade) / (rate * rate - 1.0f), Q = m * (s * P + a_b) / fade;
+    const Floats there = exponential(-rate * n), rest = exponential(-rate * behind), all = ratio * there * rest;
+    const Floats bottom = Q * through * past, first = (all * bottom - P) / (1.0f - all * all), last = -(bottom + all * first);
+    return {maximum<float>(P * through + first * there + ratio * last * rest, splat(0.0f)),
+            maximum<float>(Q * through + ratio * first * there + last * rest, splat(0.0f))};
 }
 
 /// M of the lobes R, TT and TRT + rest, widened by the light's spread.
@@ -146,8 +157,8 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     const Floats loss = square_root<float>(maximum<float>(g * g - a_b * a_b, splat(1e-6f)));
     const Floats cosines = cosine * p.cosine, sines = sine * p.sine;
     Floats direct[4], down[3], back[3];
-    widened(tables, p.rough, minimum<float>(p.rough * hits * sums[1][5], splat(2.0f)), cosines, sines, down);
-    widened(tables, p.rough, minimum<float>(p.rough * (sums[1][6] + 2.0f * sums[1][5] / (g + loss)), splat(2.0f)), cosines, sines, back);
+    widened(tables, p.rough, minimum<float>(p.rough * hits * sums[1][6], splat(2.0f)), cosines, sines, down);
+    widened(tables, p.rough, minimum<float>(p.rough * (sums[1][7] + 2.0f * sums[1][6] / (g + loss)), splat(2.0f)), cosines, sines, back);
 
     // The direct lobes, turned by the cuticle's scales
     for (int q = 0; q < 4; ++q) {
@@ -156,18 +167,18 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
         direct[q] = along(cosine * (turned < 0.0f ? -turned : turned), sine * (p.sine * ct + p.cosine * st), p.lobes[q]);
     }
 
-    const Floats through = exponential(-way.n);
+    const Floats through = exponential(-way.n), past = exponential(-way.behind);
     const Words glint = mix(p.patch + 0x9e3779b9u * uint32_t(l + 1));
     const Floats seen = light.glints ? (uniform(glint) < through ? splat(1.0f) : splat(0.0f)) : through;
-    const Floats facing = (0.5f * kPi) * maximum<float>(dot(normal, L), splat(0.2f));
+    const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
     for (int c = 0; c < 3; ++c) {
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
-        const Flux flux = two_flux(sums[c][0], sums[c][1], way.n, way.behind);
-        const Floats scattered = flux.down - through, returned = flux.back * facing;
+        const Flux flux = two_flux(sums[c], way.n, way.behind, through, past);
+        const Floats scattered = flux.down, returned = flux.up * facing;
         Floats sum = seen * (direct[0] * lobes[0] + direct[1] * lobes[1] + direct[2] * lobes[2] + direct[3] * lobes[3]);
         // G(pi - phi) = 2 mean - G(phi): the half circles complete each other
-        for (int q = 0; q < 3; ++q)
-            sum += scattered * down[q] * lobes[4 + q] + returned * back[q] * (2.0f * sums[c][2 + q] - lobes[4 + q]);
+        const Floats circle = (sums[c][0] + sums[c][1]) * (1 / kPi), twice[3] = {circle - sums[c][4] - sums[c][5], sums[c][4], sums[c][5]};
+        for (int q = 0; q < 3; ++q) sum += scattered * down[q] * lobes[4 + q] + returned * back[q] * (twice[q] - lobes[4 + q]);
         radiance[c] += light.irradiance[3 * l + c] * way.visible * sum;
     }
 }

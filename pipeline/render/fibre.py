@@ -31,6 +31,9 @@ ETA: Final = 1.55
 ABSORPTION_MAX: Final = 8.0
 """[1/radius] absorption at the last level: darker hair shows only its R lobe, as this does."""
 LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 24, 48, 140
+_DIRECTIONS: Final = 64
+_GREY: Final = 0.9999
+"""Albedo of the whitest hair when the slant is looked for: in white hair nothing fades, aslant or not."""
 
 
 def variance(roughness: _F64 | float) -> _F64:
@@ -123,6 +126,22 @@ def far_field(cosine: _F64, phi: _F64, sigma: _F64, azimuthal_roughness: float) 
     return lobes, means
 
 
+def decay(around: _F64, albedo: float) -> float:
+    """Rate at which light fades with the number of fibres across which it goes, deep among parallel ones.
+
+    The slowest of the exponentials that solve the equation of transfer in the plane across them, in 64 directions
+    (Chandrasekhar, Radiative Transfer, 1950): (1 - K cos) psi = N * psi, for N (H,) over phi in [0, pi], scaled to an
+    albedo below 1.
+    """
+    turn = (np.arange(_DIRECTIONS) + 0.5) * 2 * np.pi / _DIRECTIONS
+    # phi is 0 where light goes back the way it came
+    between = np.abs((turn[:, None] - turn) % (2 * np.pi) - np.pi)
+    kernel = np.interp(between, np.linspace(0, np.pi, around.size), around)
+    lost = np.eye(_DIRECTIONS) - albedo * kernel / kernel.sum(axis=1, keepdims=True)
+    rates = np.linalg.eigvals(np.linalg.solve(lost, np.diag(np.cos(turn))))
+    return float(1 / rates.real.max())
+
+
 @dataclass(frozen=True)
 class Scattering:
     """The tables of one kind of fibre: roughness along and around it, tilt [rad] of the cuticle's scales to the root."""
@@ -146,14 +165,25 @@ class Scattering:
 
     @cached_property
     def sums(self) -> _F64:
-        """(A, T, 8): a_f, a_b, circle means of N for R, TT, TRT + rest, spreads v_f, v_b of forward and back, 0."""
-        _, means = self.far_field
+        """(A, T, 8): a_f, a_b, s, m, twice the circle means of N for TT and TRT + rest, spreads v_f, v_b of forward and back.
+
+        Of light from everywhere on one side s is scattered back to it; m is how much aslant such light goes: see shade.hpp.
+        """
+        lobes, means = self.far_field
         v = variances(self.roughness)[:, None, None]
         back, forward = np.pi * means[..., 0], np.pi * means[..., -1]
-        circle = (back + forward) / (2 * np.pi)
+        twice = (back + forward) / np.pi
         a_f, a_b = forward.sum(0), back.sum(0)
         v_f, v_b = (v * forward).sum(0) / a_f, (v * back).sum(0) / a_b
-        return np.stack([a_f, a_b, circle[0], circle[1], circle[2] + circle[3], v_f, v_b, 0 * a_f], axis=-1)
+        # By the mean cosine: where light fades slowly two streams are then right (m is the root of 2)
+        turned = (1 + np.cos(np.linspace(0, np.pi, AZIMUTHS))) / 2
+        s = (a_f + a_b) * ((lobes.sum(0) @ turned) / lobes.sum((0, 3)))
+        around = lobes[:, :, 0].sum(0)
+        albedo, share = _GREY * (a_f + a_b)[:, 0], _GREY * s[:, 0]
+        rates = [decay(each, most) for each, most in zip(around, albedo, strict=True)]
+        m = rates / np.sqrt((1 - albedo + share) ** 2 - share**2)
+        slant = np.broadcast_to(m[:, None], s.shape)
+        return np.stack([a_f, a_b, s, slant, twice[1], twice[2] + twice[3], v_f, v_b], axis=-1)
 
     def loss(self, sigma: _F32 | _F64) -> _F32:
         """Part k of the light that a fibre takes away for good, for absorption sigma (...): same shape, float32.
