@@ -89,20 +89,24 @@ RINGLET_INLINE Vec3<float> clear_of(const Vec3<float> &normal, const Vec3<float>
 
 /// Part of the light of map l, in R, G, B, that hair lets past around points `above` the skin, from the middle of the map:
 /// the mean over a disc as wide as light spreads in skin (Jensen et al., A Practical Model for Subsurface Light
-/// Transport, 2001). Shadows of single strands, finer than the mesh they fall on, would be stains at its points.
-inline void past_hair(const Illumination &light, int l, const Vec3<float> &above, const Vec3<float> &normal,
-                      const float loss[3], Floats past[3]) {
+/// Transport, 2001). Shadows of single strands, finer than the mesh they fall on, would be stains at its points. The part
+/// that meets no strand at all comes back: what strands have scattered gives no gloss.
+inline Floats past_hair(const Illumination &light, int l, const Vec3<float> &above, const Vec3<float> &normal,
+                        const float loss[3], Floats past[3]) {
     constexpr int places = 8;
     constexpr float radius = 4e-3f; // [m]
     const Floats flat = 1.0f - normal.y * normal.y, down = 1.0f / square_root<float>(flat + 1e-6f);
     const Vec3<float> along{down * normal.z, splat(0.0f), -(down * normal.x)}, across = cross(normal, along);
     for (int c = 0; c < 3; ++c) past[c] = splat(0.0f);
+    Floats straight = splat(0.0f);
     for (int k = 0; k < places; ++k) {
         const float out = radius * std::sqrt((k + 0.5f) / places), turn = 2.39996323f * k; // the golden angle
         const Vec3<float> at = above + splat(out * std::cos(turn)) * along + splat(out * std::sin(turn)) * across;
         const Floats n = reach(light.shadows->maps[l], at, 0.0f).n;
         for (int c = 0; c < 3; ++c) past[c] += (1.0f / places) * exponential(-loss[c] * n);
+        straight += (1.0f / places) * exponential(-n);
     }
+    return straight;
 }
 
 RINGLET_INLINE Floats gloss(const SkinPoints &p, const Vec3<float> &L, Floats facing) {
@@ -120,9 +124,11 @@ inline void light_skin(const SkinPoints &p, const Illumination &light, const Occ
     Floats around[8];
     read_surroundings(light, g, around);
     const Floats beyond = outside(light, g);
+    Floats open_sky = splat(0.0f);
     for (int c = 0; c < 3; ++c) {
-        const Floats seen = minimum<float>(2.0f * around[c], splat(1.0f));
-        radiance[c] = light.sky[c] * albedo[c] * (seen + beyond * (1.0f - seen));
+        const Floats part = minimum<float>(2.0f * around[c], splat(1.0f)), seen = part + beyond * (1.0f - part);
+        radiance[c] = light.sky[c] * albedo[c] * seen;
+        open_sky += seen * (1 / 3.0f);
     }
     for (int l = 0; l < light.lights; ++l) {
         const Vec3<float> L = light.direction(l);
@@ -132,10 +138,11 @@ inline void light_skin(const SkinPoints &p, const Illumination &light, const Occ
         const Floats shine = gloss(p, L, maximum<float>(cosine, splat(0.0f)));
         Floats diffuse[3], past[3];
         scattered(cosine, p.curvature, diffuse);
-        past_hair(light, l, above, p.normal, loss, past);
+        // Between roots little is open to a mirrored ray: skin there has the gloss of what it sees of the sky, there and back
+        const Floats mirrored = shine * past_hair(light, l, above, p.normal, loss, past) * open_sky * open_sky;
         for (int c = 0; c < 3; ++c)
-            radiance[c] += light.irradiance[3 * l + c] * open * past[c] *
-                           (albedo[c] * diffuse[c] * (1 / 3.14159265f) + shine);
+            radiance[c] += light.irradiance[3 * l + c] * open *
+                           (past[c] * albedo[c] * diffuse[c] * (1 / 3.14159265f) + mirrored);
     }
 }
 

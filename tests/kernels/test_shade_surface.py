@@ -149,6 +149,19 @@ def test_head_shadows_itself_beyond_its_own_normals() -> None:
     assert shaded[1, 0] > 0.9 * 2.0 / np.pi * 0.28
 
 
+def test_skin_between_roots_has_less_gloss_than_light() -> None:
+    """What strands have scattered is light, but no gloss: albedo 0 leaves the gloss alone."""
+    top = np.array([[0.0, 1.0, 0.0], [0.1, 0.995, 0.0]])
+    normals = top / np.linalg.norm(top, axis=1, keepdims=True)
+    behind = Scene(lights=(Light(direction=(0, 1, -1)),), environment=(0, 0, 0))
+    bare, furry = lit(behind, ONE_HAIR, sphere()), lit(behind, fur(8000, 0.03), sphere())
+    gloss = (skin(furry, normals, 0.0) / skin(bare, normals, 0.0)).mean(0)
+    light = (skin(furry, normals) / skin(bare, normals)).mean(0)
+    print(f"under hair: gloss {gloss}, light {light} of what bare skin has")
+    assert (gloss < 0.6 * light).all()
+    assert np.ptp(gloss) < 1e-3 * gloss.mean()  # a mirror has no colour
+
+
 def test_hair_shadows_the_skin_by_its_loss() -> None:
     top = np.array([[0.0, 1.0, 0.0], [0.1, 0.995, 0.0]])
     normals = top / np.linalg.norm(top, axis=1, keepdims=True)
