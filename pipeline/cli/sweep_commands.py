@@ -22,21 +22,24 @@ from pipeline.cli.base import (
     stages_until,
 )
 
+Only = Annotated[
+    str,
+    Parameter(
+        show_default=False,
+        help='Experiments whose name, or what follows its "@", fits a pattern: "*irradiance=2*".',
+    ),
+]
+Names = Annotated[
+    bool, Parameter(negative="", show_default=False, help="Print the experiments' names and do nothing.")
+]
+
 
 @app.command(group=STAGES_GROUP, sort_key=1.5)
 def sweep(
     config: ConfigFile,
     *,
-    only: Annotated[
-        str,
-        Parameter(
-            show_default=False,
-            help='Experiments whose name, or what follows its "@", fits a pattern: "*irradiance=2*".',
-        ),
-    ] = "*",
-    names: Annotated[
-        bool, Parameter(negative="", show_default=False, help="Print the experiments' names and do nothing.")
-    ] = False,
+    only: Only = "*",
+    names: Names = False,
     until: Stage = "render",
     frames: FrameRange = "",
     settings: Settings = (),
