@@ -165,6 +165,8 @@ class Column:
         where = f"rows {number * size} and up of dataset {self._dataset.name}"
         try:
             offset = (number * size,) + (0,) * (len(shape) - 1)
+            if self._dataset.id.get_chunk_info_by_coord(offset).size > self._path.stat().st_size:
+                raise ValueError("a chunk larger than its file")  # before room is made for it
             _, stored = self._dataset.id.read_direct_chunk(offset)
             raw = isal_zlib.decompressobj().decompress(stored, length + 1)  # no more, whatever it claims
         except (OSError, RuntimeError, ValueError, _NotDeflated) as error:

@@ -35,6 +35,7 @@ FILES: dict[tuple[str, ...], tuple[str, ...]] = {
 }
 
 _DEEPEST = 32  # levels of tables and lists in a config
+_PART = re.compile(r"""[\w'"-]+|"[^"]*"|'[^']*'""")  # of a key, between dots
 
 SEQUENCES: tuple[tuple[str, ...], ...] = (("scene", "body"),)  # keys that name numbered files
 
@@ -153,7 +154,7 @@ def _read(path: Path, files: list[Path], roots: tuple[Path, ...]) -> Tree:
 
 def _parsed(path: Path, text: str) -> dict[str, Any]:
     try:
-        values = tomllib.loads(text)
+        values = None if _long_keys(text) else tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(_syntax(path, text, str(error))) from None
     except ValueError as error:  # numbers of thousands of digits
@@ -163,6 +164,17 @@ def _parsed(path: Path, text: str) -> dict[str, Any]:
     if values is None or not _shallow(values):
         raise InputError(f"{path}: values within values more than {_DEEPEST} levels deep; no config is")
     return values
+
+
+def _long_keys(text: str) -> bool:
+    """Whether some key has more than `_DEEPEST` parts, of which the parser keeps every beginning."""
+    for line in text.splitlines():
+        parts = 0
+        for part in line.split("."):
+            parts = parts + 1 if _PART.fullmatch(part.strip()) else 0
+            if parts > _DEEPEST:
+                return True
+    return False
 
 
 def _shallow(values: Any) -> bool:

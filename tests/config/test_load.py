@@ -1,6 +1,7 @@
 """Loading configs: values, inheritance, overrides, and one clear line for everything that is wrong."""
 
 import re
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -195,3 +196,15 @@ def test_a_binary_file_is_no_config(tmp_path: Path, content: bytes) -> None:
 def test_a_folder_is_no_config(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read as a text file"):
         load(tmp_path)
+
+
+def test_a_key_of_very_many_parts_takes_no_room(tmp_path: Path) -> None:
+    """The parser keeps every beginning of a key: 20,000 parts would be 1.6 GB."""
+    write(tmp_path, "x.toml", "[scene]\n" + ".".join(["a"] * 20_000) + " = 1\n")
+    tracemalloc.start()
+    with pytest.raises(InputError, match="more than 32 levels deep"):
+        load(tmp_path / "x.toml")
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    print(f"{most / 1e6:.1f} MB")
+    assert most < 20e6
