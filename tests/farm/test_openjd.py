@@ -7,28 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from tiny_run import tiny
 
 from pipeline import cache
 from pipeline.cli.main import call
 
 ROOT = Path(__file__).parents[2]
 OPENJD = Path(sys.executable).with_name("openjd")
-CONFIG = """\
-[scene]
-head = "none"
-[groom]
-source = "swatch"
-strands = 4
-guides = 2
-points = 8
-[simulate]
-frames = 5
-settle = "0 s"
-[render]
-size = [16, 16]
-samples = 1
-grid = 16
-"""
+CONFIG = tiny(5)
 
 
 @pytest.fixture

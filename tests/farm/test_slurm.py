@@ -9,28 +9,14 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from tiny_run import tiny
 
 from pipeline import cache
 
 pytest.importorskip("distributed", reason='needs the extra "farm"')
 ROOT = Path(__file__).parents[2]
 FRAMES = 4
-CONFIG = f"""\
-[scene]
-head = "none"
-[groom]
-source = "swatch"
-strands = 4
-guides = 2
-points = 8
-[simulate]
-frames = {FRAMES}
-settle = "0 s"
-[render]
-size = [16, 16]
-samples = 1
-grid = 16
-"""
+CONFIG = tiny(FRAMES)
 
 
 def script() -> str:
