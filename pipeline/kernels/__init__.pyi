@@ -730,7 +730,7 @@ class FibreTables:
         """The tables, held and not copied.
 
         Args:
-            lobes: (A, T, H, 8) float32 over absorption (uniform in its root), theta_d in [0, pi/2], phi in [0, pi]:
+            lobes: (A, T, H, 8) float32 over absorption (uniform in its root), theta in [0, pi/2], phi in [0, pi]:
                 N_R, N_TT, N_TRT, N_rest [1/rad], their means over a half circle G_R, G_TT, G_TRT + G_rest, 0.
             sums: (A, T, 8) float32: a_f, a_b, s, m (see shade.hpp), twice the mean of N over the circle
                 for TT and TRT + rest, v_f, v_b.
@@ -741,6 +741,10 @@ class FibreTables:
             absorption_max: [1/radius], absorption at the last level.
 
         """
+
+    reciprocal: (
+        bool  # False: light that is scattered once takes its lobes at theta_d, not at the eye's theta_o
+    )
 
 class Illumination:
     """Lights and sky, and what of them reaches where."""

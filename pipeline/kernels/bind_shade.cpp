@@ -116,7 +116,8 @@ static Radiance shade_head(const HeldSurface &surface, Point eye, const HeldLigh
 void bind_shade(nb::module_ &m) {
     nb::class_<HeldTables>(m, "FibreTables")
         .def("__init__", &make_tables, nb::arg("lobes"), nb::arg("sums"), nb::arg("pigment"), nb::arg("variance"),
-             nb::arg("tilt"), nb::arg("absorption_max"));
+             nb::arg("tilt"), nb::arg("absorption_max"))
+        .def_rw("reciprocal", &HeldTables::reciprocal);
     nb::class_<HeldLight>(m, "Illumination")
         .def("__init__", &make_light, nb::arg("directions"), nb::arg("irradiance"), nb::arg("sky"), nb::arg("shadows"),
              nb::arg("surroundings"))

@@ -28,6 +28,7 @@ struct FibreTables {
     const float *pigment; // (K, J, 4): absorption R, G, B [1/radius], variance over `variance`; from root to tip, and by u
     int A, T, H, K, J;
     float variance[4], absorption_max;
+    bool reciprocal = false; // light that is scattered once takes the lobes at theta_d, not at theta_o
     float tilt_cosine[4], tilt_sine[4]; // of the shift of theta_o in each lobe
 };
 
@@ -99,7 +100,7 @@ RINGLET_INLINE void read(const float *table, const Place &x, const Place &y, con
     transpose(records, entries);
 }
 
-/// Entries of `lobes` for 16 points: linear in absorption, theta_d and phi.
+/// Entries of `lobes` for 16 points: linear in absorption, theta and phi.
 RINGLET_INLINE void read_lobes(const FibreTables &tables, const Place &level, const Place &theta, const Place &phi, Floats entries[8]) {
     const size_t row = 8 * size_t(tables.H), stride[3] = {row * tables.T, row, 8};
     read<Eight>(tables.lobes, level, theta, phi, stride, entries);
@@ -118,7 +119,7 @@ RINGLET_INLINE void read(const float *table, int across, const Place &x, const P
     transpose(records, entries);
 }
 
-/// Entries of `sums` for 16 points: linear in absorption and theta_d.
+/// Entries of `sums` for 16 points: linear in absorption and theta.
 RINGLET_INLINE void read_sums(const FibreTables &tables, const Place &level, const Place &theta, Floats entries[8]) {
     read<Eight>(tables.sums, tables.T, level, theta, entries);
 }

@@ -21,6 +21,8 @@
 
 namespace ringlet {
 
+constexpr float kPi = 3.14159265f;
+
 struct StrandPoints {
     const float *points;     // (S, P, 3)
     const float *variation; // (S, 3)
@@ -34,6 +36,27 @@ struct StrandPoints {
     }
 };
 
+/// How one channel's light goes in a layer of such fibres: D and U are sums of P e^-n, Q e^-n and of exponentials at a rate,
+/// each with its ratio of U to D.
+struct Layer {
+    Floats P, Q, rate, ratio;
+    Floats twice[3]; // circle means of N_R, N_TT, N_TRT + N_rest, two times
+
+    Layer() = default;
+    RINGLET_INLINE explicit Layer(const Floats sums[8]) {
+        const Floats a_f = sums[0], a_b = sums[1], s = sums[2], m = sums[3], g = 1.0f - a_f - a_b + s;
+        const Floats k = square_root<float>(maximum<float>(g * g - s * s, splat(1e-6f)));
+        ratio = s / (g + k);
+        // Where scattered light fades just as the direct light does, the solution has another form, and this one a pole
+        rate = m * k;
+        const Floats off = rate - 1.0f;
+        rate = off * off > 1e-6f ? rate : (off < 0.0f ? splat(0.999f) : splat(1.001f));
+        const Floats fade = 1.0f + m * g;
+        P = m * (m * s * a_b + a_f * fade) / (rate * rate - 1.0f), Q = m * (s * P + a_b) / fade;
+        twice[0] = (a_f + a_b) * (1 / kPi) - sums[4] - sums[5], twice[1] = sums[4], twice[2] = sums[5];
+    }
+};
+
 /// 16 points of strands, and what does not depend on the light.
 struct FibrePoints {
     Vec3<float> x, at, tangent, to_eye; // x in voxels; at [m] from the middle of the shadow maps
@@ -41,12 +64,18 @@ struct FibrePoints {
     Floats level[3];                // absorption in entries of the tables
     Floats rough;                   // variance of the lobes over that of the tables
     Lobe lobes[4];
-    Floats albedo[3];               // a_f + a_b across the fibre
+    Floats albedo[3];               // a_f + a_b
+    Layer layers[3];
+    Floats passed, forward, back;   // green's a_f; variance that each fibre adds to light it passes, and of light from behind
     Words patch;                    // hash of 4 mm of its strand
 };
 
-constexpr float kPi = 3.14159265f;
 constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
+
+/// An inclination's place in the tables.
+RINGLET_INLINE Place inclination(const FibreTables &tables, Floats theta) {
+    return Place((theta < 0.0f ? -theta : theta) * (2 * (tables.T - 1) / kPi), tables.T);
+}
 
 /// Colour and roughness of points at a place along their strands (0 .. 1) that differ from others by u (0 .. 1) in colour
 /// and by a factor in the variance of their lobes.
@@ -56,11 +85,16 @@ inline void read_colour(const FibreTables &tables, Floats along, Floats u, Float
     p.rough = rougher * entries[3];
     for (int q = 0; q < 4; ++q) p.lobes[q] = Lobe(p.rough * tables.variance[q]);
     const float scale = (tables.A - 1) / std::sqrt(tables.absorption_max);
+    const Place theta = inclination(tables, p.theta);
     for (int c = 0; c < 3; ++c) {
         p.level[c] = square_root<float>(maximum<float>(entries[c], splat(0.0f))) * scale;
         Floats sums[8];
-        read_sums(tables, Place(p.level[c], tables.A), Place(splat(0.0f), tables.T), sums);
+        read_sums(tables, Place(p.level[c], tables.A), theta, sums);
         p.albedo[c] = sums[0] + sums[1];
+        p.layers[c] = Layer(sums);
+        if (c != 1) continue;
+        const Floats g = 1.0f - sums[0], loss = square_root<float>(maximum<float>(g * g - sums[1] * sums[1], splat(1e-6f)));
+        p.passed = sums[0], p.forward = p.rough * sums[6], p.back = p.rough * (sums[7] + 2.0f * sums[6] / (g + loss));
     }
 }
 
@@ -113,19 +147,11 @@ struct Flux {
 };
 
 /// At the depth n of n + n_b; `through` and `past` are e^-n and e^-n_b.
-RINGLET_INLINE Flux two_flux(const Floats sums[8], Floats n, Floats behind, Floats through, Floats past) {
-    const Floats a_f = sums[0], a_b = sums[1], s = sums[2], m = sums[3], g = 1.0f - a_f - a_b + s;
-    const Floats k = square_root<float>(maximum<float>(g * g - s * s, splat(1e-6f))), ratio = s / (g + k);
-    // Where scattered light fades just as the direct light does, the solution has another form, and this one a pole
-    Floats rate = m * k;
-    const Floats off = rate - 1.0f;
-    rate = off * off > 2.5e-5f ? rate : (off < 0.0f ? splat(0.995f) : splat(1.005f));
-    const Floats fade = 1.0f + m * g;
-    const Floats P = m * (m * s * a_b + a_f * fade) / (rate * rate - 1.0f), Q = m * (s * P + a_b) / fade;
-    const Floats there = exponential(-rate * n), rest = exponential(-rate * behind), all = ratio * there * rest;
-    const Floats bottom = Q * through * past, first = (all * bottom - P) / (1.0f - all * all), last = -(bottom + all * first);
-    return {maximum<float>(P * through + first * there + ratio * last * rest, splat(0.0f)),
-            maximum<float>(Q * through + ratio * first * there + last * rest, splat(0.0f))};
+RINGLET_INLINE Flux two_flux(const Layer &a, Floats n, Floats behind, Floats through, Floats past) {
+    const Floats there = exponential(-a.rate * n), rest = exponential(-a.rate * behind), all = a.ratio * there * rest;
+    const Floats bottom = a.Q * through * past, first = (all * bottom - a.P) / (1.0f - all * all), last = -(bottom + all * first);
+    return {maximum<float>(a.P * through + first * there + a.ratio * last * rest, splat(0.0f)),
+            maximum<float>(a.Q * through + a.ratio * first * there + last * rest, splat(0.0f))};
 }
 
 /// M of the lobes R, TT and TRT + rest, widened by the light's spread.
@@ -146,19 +172,15 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     const Floats difference = p.theta - (0.5f * kPi - arc_cosine(sine));
     const Floats azimuths = clamp((dot(p.to_eye, L) - p.sine * sine) / (p.cosine * cosine), -1, 1), phi = arc_cosine(azimuths);
     way.n *= 1.0f - shared(way.way * cosine, square_root<float>(2.0f - 2.0f * azimuths), map.width);
-    const Place theta((difference < 0.0f ? -difference : difference) * ((tables.T - 1) / kPi), tables.T);
+    const Place theta = inclination(tables, tables.reciprocal ? 0.5f * difference : p.theta);
     const Place azimuth(phi * ((tables.H - 1) / kPi), tables.H);
 
     // Spread of light that went through n fibres, from the green channel
-    Floats lobes[8], sums[3][8];
-    for (int c = 0; c < 3; ++c) read_sums(tables, Place(p.level[c], tables.A), theta, sums[c]);
-    const Floats a_f = sums[1][0], a_b = sums[1][1], g = 1.0f - a_f;
-    const Floats hits = way.n * a_f / (1.0f - exponential(-way.n * a_f) + 1e-6f);
-    const Floats loss = square_root<float>(maximum<float>(g * g - a_b * a_b, splat(1e-6f)));
+    const Floats hits = way.n * p.passed / (1.0f - exponential(-way.n * p.passed) + 1e-6f);
     const Floats cosines = cosine * p.cosine, sines = sine * p.sine;
-    Floats direct[4], down[3], back[3];
-    widened(tables, p.rough, minimum<float>(p.rough * hits * sums[1][6], splat(2.0f)), cosines, sines, down);
-    widened(tables, p.rough, minimum<float>(p.rough * (sums[1][7] + 2.0f * sums[1][6] / (g + loss)), splat(2.0f)), cosines, sines, back);
+    Floats lobes[8], direct[4], down[3], back[3];
+    widened(tables, p.rough, minimum<float>(hits * p.forward, splat(2.0f)), cosines, sines, down);
+    widened(tables, p.rough, minimum<float>(p.back, splat(2.0f)), cosines, sines, back);
 
     // The direct lobes, turned by the cuticle's scales
     for (int q = 0; q < 4; ++q) {
@@ -173,11 +195,11 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
     for (int c = 0; c < 3; ++c) {
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
-        const Flux flux = two_flux(sums[c], way.n, way.behind, through, past);
+        const Flux flux = two_flux(p.layers[c], way.n, way.behind, through, past);
         const Floats scattered = flux.down, returned = flux.up * facing;
         Floats sum = seen * (direct[0] * lobes[0] + direct[1] * lobes[1] + direct[2] * lobes[2] + direct[3] * lobes[3]);
         // G(pi - phi) = 2 mean - G(phi): the half circles complete each other
-        const Floats circle = (sums[c][0] + sums[c][1]) * (1 / kPi), twice[3] = {circle - sums[c][4] - sums[c][5], sums[c][4], sums[c][5]};
+        const Floats *twice = p.layers[c].twice;
         for (int q = 0; q < 3; ++q) sum += scattered * down[q] * lobes[4 + q] + returned * back[q] * (twice[q] - lobes[4 + q]);
         radiance[c] += light.irradiance[3 * l + c] * way.visible * sum;
     }

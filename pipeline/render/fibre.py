@@ -3,15 +3,16 @@
 A fibre scatters in four lobes p = R, TT, TRT and the rest (TRRT and beyond): S = sum M_p N_p. M_p, along the fibre,
 has a closed form that the kernel evaluates; N_p, around it, is the mean over the offset h across the fibre,
 
-    N_p(theta_d, phi) = 1/2 int_{-1}^{1} A_p(h) D_p(phi - Phi_p(h)) dh,
+    N_p(theta, phi) = 1/2 int_{-1}^{1} A_p(h) D_p(phi - Phi_p(h)) dh,
 
-and G_p its mean over phi +- pi/2, which multiple scattering needs. theta_d = (theta_o - theta_i) / 2; phi = 0 has the
-light and the eye on the same side; absorption sigma_a is in 1 / (fibre radius).
+and G_p its mean over phi +- pi/2, which multiple scattering needs. theta is the eye's inclination theta_o, or, for who
+wants light and eye to change places, theta_d = (theta_o - theta_i) / 2; phi = 0 has the light and the eye on the same
+side; absorption sigma_a is in 1 / (fibre radius).
 
 Sources: Marschner et al., Light Scattering from Human Hair Fibers, SIGGRAPH 2003 (lobes); d'Eon et al., An
 Energy-Conserving Hair Reflectance Model, EGSR 2011 (A_p, M_p); Chiang et al., A Practical and Controllable Hair and
-Fur Model, Eurographics 2016, eq. 7-8 (D_p, roughness). Unlike Chiang we take Fresnel and absorption at theta_d, not
-theta_o: reciprocal, and one axis less; `test_white_fibre_keeps_all_light` bounds what that loses.
+Fur Model, Eurographics 2016, eq. 7-8 (D_p, roughness), who takes Fresnel and absorption at theta_o, where a white fibre
+returns to any eye all that it gets; Marschner takes them at theta_d, which is reciprocal.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ ETA: Final = 1.55
 """Refractive index of keratin."""
 ABSORPTION_MAX: Final = 8.0
 """[1/radius] absorption at the last level: darker hair shows only its R lobe, as this does."""
-LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 24, 48, 140
+LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 52, 48, 140
 _DIRECTIONS: Final = 64
 _GREY: Final = 0.9999
 """Albedo of the whitest hair when the slant is looked for: in white hair nothing fades, aslant or not."""
@@ -104,7 +105,7 @@ def far_field(cosine: _F64, phi: _F64, sigma: _F64, azimuthal_roughness: float) 
     """N and its half-circle mean G, both (4, A, T, H) [1/rad].
 
     Args:
-        cosine: (T,) of theta_d, > 0.
+        cosine: (T,) of theta, > 0.
         phi: (H,) [rad].
         sigma: (A,) [1/radius].
         azimuthal_roughness: 0.1 .. 1.
@@ -149,6 +150,7 @@ class Scattering:
     roughness: float
     azimuthal_roughness: float
     tilt: float
+    reciprocal: bool = False
 
     @cached_property
     def far_field(self) -> tuple[_F64, _F64]:
@@ -199,7 +201,7 @@ class Scattering:
         record = [*lobes, means[0], means[1], means[2] + means[3], 0 * means[0]]
         # The cuticle's scales lean towards the tip: R turns to the tip, TT and TRT to the root
         tilt = self.tilt * np.array([2.0, -1.0, -4.0, 0.0])
-        return kernels.FibreTables(
+        tables = kernels.FibreTables(
             np.ascontiguousarray(np.stack(record, axis=-1), np.float32),
             np.ascontiguousarray(self.sums, np.float32),
             pigment,
@@ -207,3 +209,5 @@ class Scattering:
             tilt.astype(np.float32),
             ABSORPTION_MAX,
         )
+        tables.reciprocal = self.reciprocal
+        return tables

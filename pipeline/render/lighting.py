@@ -64,7 +64,7 @@ class Lighting:
         self._voxels = grid
         self._directions, self._irradiance = as_directions(scene.lights)
         self._sky = np.array(scene.environment, np.float32)
-        scattering = fibre.Scattering(hair.roughness, hair.azimuthal_roughness, hair.tilt)
+        scattering = fibre.Scattering(hair.roughness, hair.azimuthal_roughness, hair.tilt, hair.reciprocal)
         colours = pigment.table(hair)
         self._tables = scattering.tables(colours)
         # Light that comes from everywhere has passed all of the strands

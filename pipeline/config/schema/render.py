@@ -45,6 +45,8 @@ class Fibre(Section):
     """Roughness around the fibre."""
     tilt: Angle = 0.03490658503988659
     """Tilt of the cuticle scales."""
+    reciprocal: bool = False
+    """Fresnel's terms and the absorption of a fibre are those at half the difference of both inclinations, not, as in path tracers, at the eye's: light and eye may then change places."""
     glints: bool = True
     """Sample visibility per strand instead of averaging it: single exposed strands sparkle."""
     dye: Dye | None = None
