@@ -86,8 +86,6 @@ Seconds are those of a busy machine with two cores, ours with all preparation an
   an even sheen: the 99th percentile of black hair tells the difference.
 * **Light that is scattered many times** is that of an even layer of hair here, and of the strands as they lie in the path tracer. A layer
   has no sides, through which light leaves hair that stands open.
-* **Fresnel's terms and absorption** are taken at half the difference of both inclinations here, which is reciprocal, and at the eye's
-  inclination in Mitsuba.
 * **The head** is matte there and shines a little here (our skin has a gloss); shadows of single strands on it are sharp there and as wide as light
   spreads in skin here. It takes light from the hair in both, but gives some back to the hair only there.
 * **Noise** is all the path tracer's.
@@ -262,14 +260,14 @@ def description(mitsuba: Any, reference: Reference, curves: Path) -> dict[str, A
 
 
 def hair(reference: Reference) -> dict[str, Any]:
-    """The fibre: absorption is per radius in both."""
+    """The fibre: absorption is per radius in both; scales that lean to the tip have a negative angle in Mitsuba."""
     own = reference.fibre
     return {
         "type": "hair",
         "sigma_a": colour(pigment.absorption(own.melanin, own.redness)),
         "longitudinal_roughness": own.roughness,
         "azimuthal_roughness": own.azimuthal_roughness,
-        "scale_tilt": float(np.degrees(own.tilt)),
+        "scale_tilt": -float(np.degrees(own.tilt)),
         "int_ior": 1.55,
         "ext_ior": 1.0,
     }
