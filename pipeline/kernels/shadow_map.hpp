@@ -32,12 +32,15 @@ struct Sums {
         if (!bits) throw std::bad_alloc();
     }
 
-    /// Rounded; larger numbers become the largest.
-    static uint16_t packed(float n) {
-        const float scaled = std::min(32 * n, 65504.0f);
-        uint32_t word;
-        __builtin_memcpy(&word, &scaled, sizeof word);
-        return scaled < 0x1p-14f ? 0 : uint16_t((word - (112u << 23) + 0x1000) >> 13);
+    /// Writes 16 numbers, rounded; larger ones become the largest.
+    static RINGLET_INLINE void write(uint16_t *to, Floats n) {
+        typedef uint16_t Halves __attribute__((vector_size(32)));
+        const Floats scaled = minimum<float>(32.0f * n, splat(65504.0f));
+        Words words;
+        __builtin_memcpy(&words, &scaled, sizeof words);
+        words = scaled < 0x1p-14f ? Words{} : (words - (112u << 23) + 0x1000) >> 13;
+        const Halves halves = __builtin_convertvector(words, Halves);
+        __builtin_memcpy(to, &halves, sizeof halves);
     }
 
     /// Numbers `at` and `at` + 1 of every lane.

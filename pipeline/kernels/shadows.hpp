@@ -67,10 +67,10 @@ struct Shadows {
             const float to_light[3] = {-away[0], -away[1], -away[2]};
             deep[l] = voxels.deep(to_light);
         }
+        ShadowFill fill(casters, threads);
         for (size_t l = 0; l < maps.size(); ++l) {
-            ShadowMap &map = maps[l];
-            ShadowFill(map, casters, threads)(voxels, deep[l]);
-            find_solid(map, field, pose, threads);
+            fill(maps[l], voxels, deep[l]);
+            find_solid(maps[l], field, pose, threads);
         }
         casters = {};
     }
