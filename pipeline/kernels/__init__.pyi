@@ -653,12 +653,12 @@ def body_density(
 
     """
 
-def surroundings(hair: _F32, body: _F32, spacing: float, loss: _F32, directions: _F32) -> _F32:
+def surroundings(hair: _F32, body: _F32 | None, spacing: float, loss: _F32, directions: _F32) -> _F32:
     """What a point sees of the sky, and which way is out of the hair, on a grid of half the resolution.
 
     Args:
         hair: (nx, ny, nz) float32 [1/m], density without direction; even extents.
-        body: (nx, ny, nz) float32 [1/m].
+        body: (nx, ny, nz) float32 [1/m]; None: there is none.
         spacing: [m].
         loss: (3,) float32, part of the light that one fibre takes away, for R, G, B.
         directions: (D, 3) float32, evenly spread unit vectors.

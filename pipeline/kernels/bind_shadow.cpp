@@ -43,7 +43,7 @@ static void finish(Shadows &shadows, Array<const float, -1, -1, -1> hair, Double
     const int n[3] = {int(hair.shape(0)), int(hair.shape(1)), int(hair.shape(2))};
     const Pose to_world = Pose::of(pose.data());
     nb::gil_scoped_release release;
-    HairVoxels voxels{hair.data(), {n[0], n[1], n[2]}, {}, float(spacing)};
+    HairVoxels voxels(hair.data(), n, float(spacing), threads());
     for (int k = 0; k < 3; ++k) voxels.origin[k] = float(origin.data()[k] - shadows.maps[0].centre[k]);
     shadows.finish(voxels, field, to_world, threads());
 }

@@ -4,6 +4,7 @@
 // one thread. Sums are integers, so nothing depends on the order of strands.
 #pragma once
 
+#include "density.hpp"
 #include "distance_field.hpp"
 #include "pose.hpp"
 #include "shadow_square.hpp"
@@ -26,18 +27,25 @@ struct Casters {
 struct HairVoxels {
     static constexpr float kDeep = 16; // strands, behind which nothing is lit directly
 
-    const float *density; // (nx, ny, nz) [1/m]
+    SweptVoxels density; // [1/m], half as fine as the density grid
     int n[3];
-    float origin[3];      // [m] corner of the first voxel, from the maps' centre on
-    float spacing;        // [m]
+    float origin[3];     // [m] corner of the first voxel, from the maps' centre on
+    float spacing;       // [m]
+
+    /// Of a density grid (nx, ny, nz).
+    HairVoxels(const float *fine, const int extents[3], float fine_spacing, int threads)
+        : density(halve(fine, extents, threads).data(), std::array<int, 3>{extents[0] / 2, extents[1] / 2, extents[2] / 2}.data(), threads),
+          n{density.n[0], density.n[1], density.n[2]}, origin{}, spacing(2 * fine_spacing) {}
 
     /// Whether something is deep, for each voxel.
     std::vector<uint8_t> deep(const float direction[3]) const {
-        const size_t voxels = size_t(n[0]) * n[1] * n[2];
-        std::vector<float> before(voxels);
-        sweep(density, before.data(), n, spacing, direction);
-        std::vector<uint8_t> result(voxels);
-        for (size_t i = 0; i < voxels; ++i) result[i] = before[i] > kDeep;
+        const Rows rows(n, dominant(direction) == 2);
+        std::vector<float> before(rows.size());
+        sweep<1>({&density}, spacing, direction,
+                 [&](size_t at, const Floats (&tau)[1]) RINGLET_ALWAYS { __builtin_memcpy(before.data() + at, tau, sizeof tau); });
+        std::vector<uint8_t> result(size_t(n[0]) * n[1] * n[2]);
+        for (int x = 0; x < n[0]; ++x)
+            rows.each(x, [&](size_t at, size_t voxel) RINGLET_ALWAYS { result[voxel] = before[at] > kDeep; });
         return result;
     }
 

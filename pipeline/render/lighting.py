@@ -51,8 +51,8 @@ class _Shadowed:
     pose: _F64
     hair: _F32
     """(nx, ny, nz) [1/m]: strands per length of a ray."""
-    body: _F32
-    """(nx, ny, nz) [1/m]: the head as an almost opaque solid."""
+    body: _F32 | None
+    """(nx, ny, nz) [1/m]: the head as an almost opaque solid; None where there is none."""
 
 
 class Lighting:
@@ -119,9 +119,8 @@ class Lighting:
         grid = self._started()
         origin = np.array(grid.origin)
         density = grid.density()
-        if head is None:
-            body = np.zeros(grid.shape, np.float32)
-        else:
+        body = None
+        if head is not None:
             body = kernels.body_density(head, pose, grid.shape, origin, grid.spacing)
         # A fibre seen from all sides shows pi / 4 of its length * width
         hair = density * np.float32(np.pi / 4)
@@ -141,7 +140,9 @@ class Lighting:
     def veil(self, eye: _F64, wider: float) -> Veil:
         """What hair and head hide from an eye (3,) [m], when strands are drawn `wider` than they shadow."""
         frame = self._finished()
-        density = np.float32(wider) * frame.hair + np.float32(_OPAQUE) * frame.body
+        density = np.float32(wider) * frame.hair
+        if frame.body is not None:
+            density += np.float32(_OPAQUE) * frame.body
         return Veil(density, np.array(frame.light.origin), frame.light.spacing, eye)
 
     def shader(self, eye: _F64) -> kernels.FibreShader:
