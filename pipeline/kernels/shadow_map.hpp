@@ -15,21 +15,19 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <vector>
 
 namespace ringlet {
 
 /// Numbers N as 16 bits each, five of them the exponent: to 1 / 2048 of 32 N in 2^-14 .. 65504, and 0 below.
 struct Sums {
-    std::unique_ptr<uint16_t[], decltype(&std::free)> bits{nullptr, std::free};
+    std::unique_ptr<uint16_t[]> bits;
+    size_t room = 0;
 
-    /// `count` zeros, which take no memory before something else is written there.
-    void clear(size_t count) {
-        bits.reset(static_cast<uint16_t *>(std::calloc(count, sizeof(uint16_t))));
-        if (!bits) throw std::bad_alloc();
+    /// Room for so many, which hold anything: they are written 16 at a time.
+    void resize(size_t count) {
+        if (count > room) bits.reset(), bits.reset(new uint16_t[count]), room = count;
     }
 
     /// Writes 16 numbers, rounded; larger ones become the largest.

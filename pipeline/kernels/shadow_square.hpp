@@ -31,13 +31,15 @@ class ShadowSquare {
     /// Squares along an axis of so many nodes.
     static int along(int nodes) { return (nodes + kSide - 1) / kSide; }
 
-    /// The squares along an axis of n nodes in which steps from `from` to `from + way` may count; whether there are any.
-    static RINGLET_INLINE bool reached(float from, float way, int n, int &first, int &last) {
-        constexpr float slack = 0.1f; // steps are rounded
-        const float low = from + std::min(way, 0.0f) - (kAfter + slack), high = from + std::max(way, 0.0f) + (kBefore + slack);
-        if (!(high >= 0 && low < float(n))) return false;
-        first = int(std::max(low, 0.0f)) / kSide, last = int(std::min(high, n - 1.0f)) / kSide;
-        return true;
+    /// The squares along an axis of n nodes, first and last, in which steps from `from` to `from + way` may count; whether
+    /// there are any.
+    static RINGLET_INLINE Ints reached(Floats from, Floats way, int n, Ints range[2]) {
+        constexpr float slack = 0.2f; // all of this is rounded
+        const Floats none = splat(0.0f), most = splat(n - 1.0f);
+        const Floats low = from + minimum<float>(way, none) - (kAfter + slack), high = from + maximum<float>(way, none) + (kBefore + slack);
+        range[0] = whole(minimum<float>(maximum<float>(low, none), most) * (1.0f / kSide));
+        range[1] = whole(minimum<float>(maximum<float>(high, none), most) * (1.0f / kSide));
+        return (high >= 0.0f) & (low < float(n));
     }
 
     /// Fills square (a, b) with those of the segments whose numbers are given.
@@ -45,7 +47,8 @@ class ShadowSquare {
         left_ = a * kSide, top_ = b * kSide;
         write_steps(segments, numbers, count);
         find_front();
-        if (steps_) count_layers(), add_up();
+        count_layers();
+        add_up();
     }
 
   private:
@@ -99,7 +102,7 @@ class ShadowSquare {
                 steps_ += size_t(pack_set_lanes(which, w, &w_[steps_]));
             }
         }
-        if (!steps_) return;
+        room_for(steps_ + 16);
         // The rest of the last 16 counts for nothing
         write(u_, steps_, splat(least[0])), write(v_, steps_, splat(least[1]));
         write(w_, steps_, splat(ShadowMap::kFar)), write(share_, steps_, Words{});
@@ -183,7 +186,6 @@ class ShadowSquare {
         for_nodes([&](int i, int j, size_t node) RINGLET_ALWAYS {
             const size_t own = size_t(i * kSide + j) * K;
             Words counts[2] = {read<Words>(counts_, own), read<Words>(counts_, own + 16)};
-            if (!any<float>(Ints(counts[0] | counts[1]) != 0)) return; // the layers are 0 as they are
             float before = 0;
             for (int half = 0; half < 2; ++half) {
                 const Floats until = sums_until(__builtin_convertvector(counts[half], Floats) * (1 / kCount)) + before;

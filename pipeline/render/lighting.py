@@ -74,6 +74,7 @@ class Lighting:
             .astype(np.float32)
         )
         self._grid: kernels.DensityGrid | None = None
+        self._shadows: kernels.Shadows | None = None
         self._frame: _Shadowed | None = None
 
     def begin(self, lower: _F64, upper: _F64, width: float, points: int = 0) -> None:
@@ -94,9 +95,9 @@ class Lighting:
         self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width)
         low = np.asarray(lower, np.float64)
         self._every = max(math.ceil((points / _CASTERS) ** 0.7), 1)
-        self._shadows = kernels.Shadows(
-            self._directions, low, low + size, spacing / _FINER, width, 1 / self._every
-        )
+        if self._shadows is None:  # kept from frame to frame for the memory of its maps
+            self._shadows = kernels.Shadows(self._directions)
+        self._shadows.begin(low, low + size, spacing / _FINER, width, 1 / self._every)
         self._added = 0
         self._frame = None
 
