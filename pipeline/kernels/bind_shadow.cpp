@@ -46,8 +46,7 @@ static void finish(Shadows &shadows, Array<const float, -1, -1, -1> hair, Double
                    Array<const double, 4, 4> pose) {
     require(spacing > 0, "Shadows.finish: expected a positive spacing");
     require(shadows.maps.size() == shadows.directions.size(), "Shadows.finish: before begin");
-    shadows.finished = shadows.maps.empty();
-    if (shadows.finished) return;
+    if (shadows.maps.empty()) return;
     const int n[3] = {int(hair.shape(0)), int(hair.shape(1)), int(hair.shape(2))};
     const Pose to_world = Pose::of(pose.data());
     nb::gil_scoped_release release;
@@ -57,7 +56,7 @@ static void finish(Shadows &shadows, Array<const float, -1, -1, -1> hair, Double
 }
 
 static nb::ndarray<nb::numpy, float> reached(const Shadows &shadows, int light, Array<const float, -1, 3> points, float own) {
-    require(light >= 0 && light < int(shadows.maps.size()), "Shadows.reach: no such light");
+    require(light >= 0 && light < int(shadows.directions.size()), "Shadows.reach: no such light");
     const ShadowMap &map = shadows.maps[light];
     require(shadows.finished, "Shadows.reach: finish the shadows first");
     const size_t N = points.shape(0);
@@ -76,7 +75,7 @@ static nb::ndarray<nb::numpy, float> reached(const Shadows &shadows, int light, 
 
 static nb::tuple map_of(nb::handle self, int light) {
     Shadows &shadows = nb::cast<Shadows &>(self);
-    require(light >= 0 && light < int(shadows.maps.size()), "Shadows.map: no such light");
+    require(light >= 0 && light < int(shadows.directions.size()), "Shadows.map: no such light");
     ShadowMap &map = shadows.maps[light];
     require(shadows.finished, "Shadows.map: finish the shadows first");
     const size_t nu = map.n[0], nv = map.n[1];

@@ -44,9 +44,9 @@ struct Shadows {
     std::vector<ShadowMap> maps;
     Casters casters;
     ShadowFill fill;
-    bool finished = false;
+    bool finished; // as soon as nothing is missing, which without lights is at once
 
-    explicit Shadows(std::vector<std::array<float, 3>> lights) : directions(std::move(lights)) {}
+    explicit Shadows(std::vector<std::array<float, 3>> lights) : directions(std::move(lights)), finished(directions.empty()) {}
     Shadows(Shadows &&) = default;
 
     /// Forgets all strands; maps keep their memory.
@@ -54,7 +54,7 @@ struct Shadows {
         maps.resize(directions.size());
         for (size_t l = 0; l < maps.size(); ++l) lay(maps[l], directions[l].data(), bounds);
         casters.clear();
-        finished = false;
+        finished = directions.empty();
     }
 
     /// Takes in strands (S, P).

@@ -5,6 +5,7 @@ holds the strands that are drawn, so that fewer, wider strands cover and shadow 
 """
 
 import math
+from copy import copy
 from dataclasses import dataclass
 from typing import Final
 
@@ -74,8 +75,14 @@ class Lighting:
             .astype(np.float32)
         )
         self._grid: kernels.DensityGrid | None = None
-        self._shadows: kernels.Shadows | None = None
+        self._shadows = kernels.Shadows(self._directions)  # its maps keep their memory from frame to frame
         self._frame: _Shadowed | None = None
+
+    def beside(self) -> "Lighting":
+        """Another one with the same lights, for the frames between."""
+        other = copy(self)
+        other._shadows = kernels.Shadows(self._directions)
+        return other
 
     def begin(self, lower: _F64, upper: _F64, width: float, points: int = 0) -> None:
         """Start a frame: bounds (3,) float64 [m] of all strands, a typical drawn width [m], how many points all have.
@@ -95,8 +102,6 @@ class Lighting:
         self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width)
         low = np.asarray(lower, np.float64)
         self._every = max(math.ceil((points / _CASTERS) ** 0.7), 1)
-        if self._shadows is None:  # kept from frame to frame for the memory of its maps
-            self._shadows = kernels.Shadows(self._directions)
         self._shadows.begin(low, low + size, spacing / _FINER, width, 1 / self._every)
         self._added = 0
         self._frame = None
