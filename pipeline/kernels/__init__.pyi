@@ -653,12 +653,12 @@ def body_density(
 
     """
 
-def surroundings(hair: _F32, body: _F32, spacing: float, loss: _F32, directions: _F32) -> _F32:
+def surroundings(hair: _F32, body: _F32 | None, spacing: float, loss: _F32, directions: _F32) -> _F32:
     """What a point sees of the sky, and which way is out of the hair, on a grid of half the resolution.
 
     Args:
         hair: (nx, ny, nz) float32 [1/m], density without direction; even extents.
-        body: (nx, ny, nz) float32 [1/m].
+        body: (nx, ny, nz) float32 [1/m]; None: there is none.
         spacing: [m].
         loss: (3,) float32, part of the light that one fibre takes away, for R, G, B.
         directions: (D, 3) float32, evenly spread unit vectors.
@@ -674,13 +674,13 @@ class Shadows:
     Sums are integers: they depend neither on threads nor on how strands are cut into chunks.
     """
 
-    def __init__(
-        self, directions: _F32, lower: _F64, upper: _F64, spacing: float, width: float, share: float = 1.0
-    ) -> None:
-        """Empty maps.
+    def __init__(self, directions: _F32) -> None:
+        """Of lights in these directions: (L, 3) float32, unit vectors towards them."""
+
+    def begin(self, lower: _F64, upper: _F64, spacing: float, width: float, share: float = 1.0) -> None:
+        """Empties the maps, in the memory that they have.
 
         Args:
-            directions: (L, 3) float32, unit vectors towards the lights.
             lower: (3,) float64 [m], bounds of all strands; what lies outside casts no shadow.
             upper: (3,) float64 [m].
             spacing: [m], between the nodes of a map; the bounds are at most 2000 of it.

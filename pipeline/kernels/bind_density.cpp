@@ -6,8 +6,11 @@
 #include "sweep.hpp"
 
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 
 #include <array>
+#include <cstring>
+#include <optional>
 
 namespace ringlet {
 
@@ -68,9 +71,17 @@ static nb::ndarray<nb::numpy, float> optical_depth(Volumes density, double spaci
     auto depth = new_array<float>({N, density.shape(1), density.shape(2), density.shape(3)});
     float *out = depth.data();
     nb::gil_scoped_release release;
+    std::vector<SweptVoxels> swept;
+    for (size_t k = 0; k < sources; ++k) swept.emplace_back(density.data() + k * voxels, n, threads());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads())
-    for (size_t i = 0; i < N; ++i)
-        sweep(density.data() + (sources == 1 ? 0 : i) * voxels, out + i * voxels, n, spacing, directions.data() + 3 * i);
+    for (size_t i = 0; i < N; ++i) {
+        const float *direction = directions.data() + 3 * i;
+        const Rows rows(n, dominant(direction) == 2);
+        std::vector<float> found(rows.size());
+        sweep<1>({&swept[sources == 1 ? 0 : i]}, spacing, direction,
+                 [&](size_t at, const Floats (&tau)[1]) { std::memcpy(found.data() + at, tau, sizeof tau); });
+        for (int x = 0; x < n[0]; ++x) rows.each(x, [&](size_t at, size_t voxel) { out[i * voxels + voxel] = found[at]; });
+    }
     return depth;
 }
 
@@ -87,10 +98,10 @@ static nb::ndarray<nb::numpy, float> body(const DistanceField &field, Array<cons
     return values;
 }
 
-static nb::ndarray<nb::numpy, float> surroundings(Volume hair, Volume body, double spacing, Floats1 loss, Vectors directions) {
+static nb::ndarray<nb::numpy, float> surroundings(Volume hair, std::optional<Volume> body, double spacing, Floats1 loss, Vectors directions) {
     int n[3];
     for (int axis = 0; axis < 3; ++axis) {
-        require(hair.shape(axis) == body.shape(axis), "surroundings: hair and body differ in shape");
+        require(!body || hair.shape(axis) == body->shape(axis), "surroundings: hair and body differ in shape");
         require(hair.shape(axis) % 2 == 0 && hair.shape(axis) >= 4, "surroundings: expected even extents, 4 or more");
         n[axis] = int(hair.shape(axis));
     }
@@ -99,9 +110,9 @@ static nb::ndarray<nb::numpy, float> surroundings(Volume hair, Volume body, doub
     auto records = new_array<float>({size_t(n[0] / 2), size_t(n[1] / 2), size_t(n[2] / 2), size_t(8)});
     float *out = records.data();
     nb::gil_scoped_release release;
-    Sky sky{halve(hair.data(), n), halve(body.data(), n), {n[0] / 2, n[1] / 2, n[2] / 2}, 2 * spacing,
-            loss.data(), directions.data(), int(directions.shape(0))};
-    add_transmittance(sky, out, threads());
+    Sky sky{halve(hair.data(), n, threads()), body ? halve(body->data(), n, threads()) : std::vector<float>(),
+            {n[0] / 2, n[1] / 2, n[2] / 2}, 2 * spacing, loss.data(), directions.data(), int(directions.shape(0))};
+    write_transmittance(sky, out, threads());
     add_normals(sky, out, threads());
     return records;
 }
@@ -116,7 +127,7 @@ void bind_density(nb::module_ &m) {
         .def_ro("spacing", &DensityGrid::spacing);
     m.def("optical_depth", &optical_depth, nb::arg("density"), nb::arg("spacing"), nb::arg("directions"));
     m.def("body_density", &body, nb::arg("field"), nb::arg("pose"), nb::arg("shape"), nb::arg("origin"), nb::arg("spacing"));
-    m.def("surroundings", &surroundings, nb::arg("hair"), nb::arg("body"), nb::arg("spacing"), nb::arg("loss"),
+    m.def("surroundings", &surroundings, nb::arg("hair"), nb::arg("body").none(), nb::arg("spacing"), nb::arg("loss"),
           nb::arg("directions"));
 }
 

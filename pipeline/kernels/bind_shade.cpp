@@ -60,7 +60,7 @@ static void make_light(HeldLight *held, Triples directions, Triples irradiance, 
     light.lights = int(directions.shape(0));
     require(irradiance.shape(0) == directions.shape(0), "Illumination: irradiance does not fit directions");
     require(shadows->maps.size() == directions.shape(0), "Illumination: shadows do not fit directions");
-    for (const ShadowMap &map : shadows->maps) require(map.layers.bits != nullptr, "Illumination: finish the shadows first");
+    require(shadows->finished, "Illumination: finish the shadows first");
     for (int axis = 0; axis < 3; ++axis) {
         light.n[axis] = 2 * int(surroundings.shape(axis));
         require(light.n[axis] >= 4, "Illumination: expected 2 or more surroundings along each axis");

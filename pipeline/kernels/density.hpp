@@ -3,13 +3,14 @@
 // A sub-segment no longer than a voxel adds length * width trilinearly to 8 voxels.
 #pragma once
 
-#include "simd.hpp"
+#include "elementary.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 namespace ringlet {
@@ -26,45 +27,71 @@ struct DensityGrid {
     size_t voxels() const { return size_t(shape[0]) * shape[1] * shape[2]; }
 };
 
-/// Adds `area` to the 8 voxels around g, given in voxels from the first voxel's middle.
-RINGLET_INLINE void add_around(const DensityGrid &grid, uint32_t *counts, const float g[3], float area) {
-    // Truncation is floor here: g >= 0 is checked on the float, so that huge values cannot wrap
-    if (!(g[0] >= 0 && g[1] >= 0 && g[2] >= 0 && g[0] < grid.shape[0] - 1 && g[1] < grid.shape[1] - 1 &&
-          g[2] < grid.shape[2] - 1))
-        return;
-    const int x = int(g[0]), y = int(g[1]), z = int(g[2]);
-    const float u = g[0] - x, v = g[1] - y, w = g[2] - z;
-    const float low = area * (1 - w), high = area * w;
-    const size_t row = grid.shape[2], slab = row * grid.shape[1];
-    uint32_t *at = counts + x * slab + y * row + z;
-    const float weight[4] = {(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v};
-    const size_t offset[4] = {0, row, slab, slab + row};
-    for (int corner = 0; corner < 4; ++corner) {
-        at[offset[corner]] += uint32_t(low * weight[corner] + 0.5f);
-        at[offset[corner] + 1] += uint32_t(high * weight[corner] + 0.5f);
+/// 16 segments side by side, each in so many steps.
+struct GridSegments {
+    Floats from[3], way[3]; // in voxels from the first voxel's middle
+    Floats steps, area;     // area that each step adds, in counts
+
+    /// Of a strand of P points and widths, from segment `first` on.
+    GridSegments(const DensityGrid &grid, const float *points, const float *widths, int first, int P) {
+        const float inverse = float(1 / grid.spacing);
+        Floats wide;
+        for (int k = 0; k < 16; ++k) {
+            const int j = std::min(first + k, P - 2);
+            for (int i = 0; i < 3; ++i) from[i][k] = points[3 * j + i], way[i][k] = points[3 * j + 3 + i];
+            wide[k] = first + k == j ? widths[j] + widths[j + 1] : 0.0f;
+        }
+        Floats length = splat(0.0f);
+        for (int i = 0; i < 3; ++i) {
+            way[i] -= from[i];
+            length += way[i] * way[i];
+            from[i] = (from[i] - float(grid.origin[i])) * inverse - 0.5f;
+            way[i] *= inverse;
+        }
+        length = square_root<float>(length);
+        // A strand that broke casts no shadow
+        const Ints sound = (length > 0.0f) & (length < 1e3f) & (wide > 0.0f);
+        steps = sound ? minimum<float>(real(whole(length * inverse)) + 1.0f, splat(4096.0f)) : splat(0.0f);
+        area = sound ? length / steps * 0.5f * wide / float(grid.quantum) : splat(0.0f);
     }
-}
+
+    /// Adds step s of all segments that have one to the 8 voxels around it.
+    RINGLET_INLINE void add(const DensityGrid &grid, uint32_t *counts, float s) const {
+        const Floats f = (s + 0.5f) / steps;
+        const int row = grid.shape[2], slab = row * grid.shape[1];
+        Ints inside = s < steps, at = Ints{};
+        Floats part[3];
+        for (int i = 0; i < 3; ++i) {
+            const Floats g = from[i] + f * way[i];
+            inside &= (g >= 0.0f) & (g < float(grid.shape[i] - 1));
+            // Huge values do not wrap: outside, it is the first voxel
+            const Ints voxel = whole(inside ? g : splat(0.0f));
+            part[i] = (inside ? g : splat(0.0f)) - real(voxel);
+            at = at * grid.shape[i] + voxel;
+        }
+        alignas(64) int32_t places[16], values[8][16];
+        const Ints first = inside ? at : Ints{};
+        std::memcpy(places, &first, sizeof places);
+        for (int corner = 0; corner < 8; ++corner) {
+            Floats weight = area;
+            for (int i = 2; i >= 0; --i) weight *= corner >> (2 - i) & 1 ? part[i] : 1.0f - part[i];
+            const Ints value = inside ? whole(weight + 0.5f) : Ints{};
+            std::memcpy(values[corner], &value, sizeof value);
+        }
+        const int offset[8] = {0, 1, row, row + 1, slab, slab + 1, slab + row, slab + row + 1};
+        for (uint32_t lanes = set_lanes<float>(inside); lanes; lanes &= lanes - 1) {
+            const int k = __builtin_ctz(lanes);
+            for (int corner = 0; corner < 8; ++corner) counts[places[k] + offset[corner]] += uint32_t(values[corner][k]);
+        }
+    }
+};
 
 /// One strand of P points and widths.
 inline void add_strand(const DensityGrid &grid, uint32_t *counts, const float *points, const float *widths, int P) {
-    const float inverse = float(1 / grid.spacing);
-    for (int j = 0; j + 1 < P; ++j) {
-        const float *a = points + 3 * j, *b = a + 3;
-        float e[3], g[3], length = 0;
-        for (int i = 0; i < 3; ++i) {
-            e[i] = b[i] - a[i];
-            length += e[i] * e[i];
-            g[i] = float((a[i] - grid.origin[i]) * inverse) - 0.5f;
-        }
-        length = std::sqrt(length);
-        if (!(length > 0 && length < 1e3f)) continue; // a strand that broke casts no shadow
-        const int steps = std::min(int(length * inverse) + 1, 4096);
-        const float area = length / steps * 0.5f * (widths[j] + widths[j + 1]) / float(grid.quantum);
-        for (int s = 0; s < steps; ++s) {
-            const float f = (s + 0.5f) / steps * inverse;
-            const float at[3] = {g[0] + f * e[0], g[1] + f * e[1], g[2] + f * e[2]};
-            add_around(grid, counts, at, area);
-        }
+    for (int first = 0; first + 1 < P; first += 16) {
+        const GridSegments segments(grid, points, widths, first, P);
+        const float most = largest<float>(segments.steps);
+        for (float s = 0; s < most; ++s) segments.add(grid, counts, s);
     }
 }
 
@@ -110,6 +137,25 @@ inline void read_density(const DensityGrid &grid, float *density, int threads) {
             if (!counts.empty()) sum += counts[i];
         density[i] = float(sum) * unit;
     }
+}
+
+/// Mean of 2 x 2 x 2 voxels, of (nx, ny, nz).
+inline std::vector<float> halve(const float *values, const int n[3], int threads) {
+    const size_t row = n[2], slab = row * n[1];
+    const int half[3] = {n[0] / 2, n[1] / 2, n[2] / 2};
+    std::vector<float> halved(size_t(half[0]) * half[1] * half[2]);
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (int x = 0; x < half[0]; ++x)
+        for (int y = 0; y < half[1]; ++y) {
+            const float *at = values + 2 * x * slab + 2 * y * row;
+            float *to = halved.data() + (size_t(x) * half[1] + y) * half[2];
+            for (int z = 0; z < half[2]; ++z) {
+                float sum = 0;
+                for (size_t corner : {size_t(0), row, slab, slab + row}) sum += at[corner + 2 * z] + at[corner + 2 * z + 1];
+                to[z] = sum / 8;
+            }
+        }
+    return halved;
 }
 
 } // namespace ringlet

@@ -15,29 +15,30 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <vector>
 
 namespace ringlet {
 
 /// Numbers N as 16 bits each, five of them the exponent: to 1 / 2048 of 32 N in 2^-14 .. 65504, and 0 below.
 struct Sums {
-    std::unique_ptr<uint16_t[], decltype(&std::free)> bits{nullptr, std::free};
+    std::unique_ptr<uint16_t[]> bits;
+    size_t room = 0;
 
-    /// `count` zeros, which take no memory before something else is written there.
-    void clear(size_t count) {
-        bits.reset(static_cast<uint16_t *>(std::calloc(count, sizeof(uint16_t))));
-        if (!bits) throw std::bad_alloc();
+    /// Room for so many, which hold anything: they are written 16 at a time.
+    void resize(size_t count) {
+        if (count > room) bits.reset(), bits.reset(new uint16_t[count]), room = count;
     }
 
-    /// Rounded; larger numbers become the largest.
-    static uint16_t packed(float n) {
-        const float scaled = std::min(32 * n, 65504.0f);
-        uint32_t word;
-        __builtin_memcpy(&word, &scaled, sizeof word);
-        return scaled < 0x1p-14f ? 0 : uint16_t((word - (112u << 23) + 0x1000) >> 13);
+    /// Writes 16 numbers, rounded; larger ones become the largest.
+    static RINGLET_INLINE void write(uint16_t *to, Floats n) {
+        typedef uint16_t Halves __attribute__((vector_size(32)));
+        const Floats scaled = minimum<float>(32.0f * n, splat(65504.0f));
+        Words words;
+        __builtin_memcpy(&words, &scaled, sizeof words);
+        words = scaled < 0x1p-14f ? Words{} : (words - (112u << 23) + 0x1000) >> 13;
+        const Halves halves = __builtin_convertvector(words, Halves);
+        __builtin_memcpy(to, &halves, sizeof halves);
     }
 
     /// Numbers `at` and `at` + 1 of every lane.

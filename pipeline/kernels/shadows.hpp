@@ -1,4 +1,4 @@
-// The shadow maps of all lights, from strands that are added in any chunks.
+// The shadow maps of all lights, frame after frame, from strands that are added in any chunks.
 #pragma once
 
 #include "shadow_fill.hpp"
@@ -12,10 +12,9 @@ struct Bounds {
     float share;               // part of all strands that casts shadows for all of them
 };
 
-/// An empty map of the light in this direction: two unit vectors across it (Duff et al., Building an Orthonormal Basis,
-/// Revisited, JCGT 2017), and room for the bounds.
-inline ShadowMap empty_map(const float L[3], const Bounds &bounds) {
-    ShadowMap map{};
+/// Lays a map of the light in this direction over the bounds: two unit vectors across it are Duff et al., Building an
+/// Orthonormal Basis, Revisited, JCGT 2017.
+inline void lay(ShadowMap &map, const float L[3], const Bounds &bounds) {
     const float sign = std::copysign(1.0f, L[2]), a = -1 / (sign + L[2]), b = L[0] * L[1] * a;
     const float axis[3][3] = {{1 + sign * L[0] * L[0] * a, sign * b, -sign * L[0]}, {b, sign + L[1] * L[1] * a, -L[1]}, {-L[0], -L[1], -L[2]}};
     __builtin_memcpy(map.axis, axis, sizeof axis);
@@ -38,41 +37,41 @@ inline ShadowMap empty_map(const float L[3], const Bounds &bounds) {
     map.opacity = 1 + 0.37f * std::min(c / bounds.share, 1.0f);
     map.own = 0.5f * c * map.opacity;
     map.width = bounds.width;
-    return map;
 }
 
 struct Shadows {
+    std::vector<std::array<float, 3>> directions; // towards the lights
     std::vector<ShadowMap> maps;
     Casters casters;
+    ShadowFill fill;
+    bool finished; // as soon as nothing is missing, which without lights is at once
 
-    Shadows() = default;
+    explicit Shadows(std::vector<std::array<float, 3>> lights) : directions(std::move(lights)), finished(directions.empty()) {}
     Shadows(Shadows &&) = default;
+
+    /// Forgets all strands; maps keep their memory.
+    void begin(const Bounds &bounds) {
+        maps.resize(directions.size());
+        for (size_t l = 0; l < maps.size(); ++l) lay(maps[l], directions[l].data(), bounds);
+        casters.clear();
+        finished = directions.empty();
+    }
 
     /// Takes in strands (S, P).
     void add(const float *points, const float *widths, size_t S, int P) {
-        if (maps.empty()) return;
-        casters.P = P;
-        const size_t first = casters.points.size();
-        casters.points.resize(first + 3 * S * P);
-        for (size_t k = 0; k < 3 * S * P; ++k) casters.points[first + k] = float(points[k] - maps[0].centre[k % 3]);
-        casters.widths.insert(casters.widths.end(), widths, widths + S * P);
+        if (!maps.empty()) casters.add(points, widths, S, P, maps[0].centre);
     }
 
     /// Makes the maps of all that was added and of the head.
     void finish(const HairVoxels &voxels, const DistanceField *field, const Pose &pose, int threads) {
-        std::vector<std::vector<uint8_t>> deep(maps.size());
+        std::vector<std::vector<int8_t>> deep(maps.size());
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+        for (size_t l = 0; l < maps.size(); ++l) deep[l] = voxels.deep(directions[l].data());
         for (size_t l = 0; l < maps.size(); ++l) {
-            const auto &away = maps[l].axis[2];
-            const float to_light[3] = {-away[0], -away[1], -away[2]};
-            deep[l] = voxels.deep(to_light);
+            fill(maps[l], casters, voxels.deep_in(deep[l]), threads);
+            find_solid(maps[l], field, pose, threads);
         }
-        for (size_t l = 0; l < maps.size(); ++l) {
-            ShadowMap &map = maps[l];
-            ShadowFill(map, casters, threads)(voxels, deep[l]);
-            find_solid(map, field, pose, threads);
-        }
-        casters = {};
+        finished = true;
     }
 };
 

@@ -138,6 +138,20 @@ RINGLET_INLINE int write_set_lanes(Mask<float> mask, int first, int *to) {
 #endif
 }
 
+/// Writes the values of the lanes that are set one after the other, and how many there are comes back. All of
+/// to[0 .. 15] may be written to.
+RINGLET_INLINE int pack_set_lanes(Mask<float> mask, Lanes<float> values, float *to) {
+#ifdef __AVX512F__
+    const uint32_t bits = set_lanes<float>(mask);
+    _mm512_storeu_ps(to, _mm512_maskz_compress_ps(__mmask16(bits), __m512(values)));
+    return __builtin_popcount(bits);
+#else
+    int count = 0;
+    for (uint32_t bits = set_lanes<float>(mask); bits; bits &= bits - 1) to[count++] = values[__builtin_ctz(bits)];
+    return count;
+#endif
+}
+
 /// Reads values[at] and values[at + 1] of every lane.
 template <class Real>
 RINGLET_INLINE void gather_pairs(const float *values, Mask<Real> at, Lanes<Real> &first, Lanes<Real> &second) {

@@ -7,6 +7,8 @@
 #include "pose.hpp"
 #include "sweep.hpp"
 
+#include <optional>
+
 namespace ringlet {
 
 /// Where a grid stands: shape, outer corner of its first voxel, side of a voxel.
@@ -39,25 +41,9 @@ inline void body_density(const DistanceField &field, const Pose &pose, const Gri
         }
 }
 
-/// Mean of 2 x 2 x 2 voxels.
-inline std::vector<float> halve(const float *values, const int n[3]) {
-    const size_t row = n[2], slab = row * n[1];
-    std::vector<float> halved;
-    halved.reserve(slab * n[0] / 8);
-    for (int x = 0; x + 1 < n[0]; x += 2)
-        for (int y = 0; y + 1 < n[1]; y += 2)
-            for (int z = 0; z + 1 < n[2]; z += 2) {
-                const float *at = values + x * slab + y * row + z;
-                float sum = 0;
-                for (size_t corner : {size_t(0), row, slab, slab + row}) sum += at[corner] + at[corner + 1];
-                halved.push_back(sum / 8);
-            }
-    return halved;
-}
-
 /// Hair and head at half the resolution, and the sky's directions.
 struct Sky {
-    std::vector<float> hair, body; // [1/m]
+    std::vector<float> hair, body; // [1/m]; no body: nothing
     int n[3];
     double spacing;                // [m]
     const float *loss;             // (3,)
@@ -65,30 +51,64 @@ struct Sky {
     int count;                     // D
 };
 
-/// Adds e^(-k n - body), k for R, G and B, over all directions to records (nx, ny, nz, 8). The order of the sum is
-/// that of the directions, for any number of threads.
-inline void add_transmittance(const Sky &sky, float *records, int threads) {
-    const ptrdiff_t voxels = ptrdiff_t(sky.hair.size());
-    constexpr int batch = 4;
-    std::vector<std::vector<float>> depths(2 * batch, std::vector<float>(voxels + 16));
-    for (int first = 0; first < sky.count; first += batch) {
-        const int last = std::min(first + batch, sky.count);
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
-        for (int job = 2 * first; job < 2 * last; ++job)
-            sweep((job % 2 ? sky.body : sky.hair).data(), depths[job - 2 * first].data(), sky.n, sky.spacing,
-                  sky.directions + 3 * (job / 2));
-#pragma omp parallel for schedule(static) num_threads(threads)
-        for (ptrdiff_t i = 0; i < voxels; i += 16)
-            for (int d = 0; d < last - first; ++d) {
-                Floats hair, body;
-                __builtin_memcpy(&hair, &depths[2 * d][i], sizeof hair);
-                __builtin_memcpy(&body, &depths[2 * d + 1][i], sizeof body);
-                for (int c = 0; c < 3; ++c) {
-                    const Floats share = exponential(-sky.loss[c] * hair - body) * (1.0f / sky.count);
-                    for (ptrdiff_t k = 0; k < 16 && i + k < voxels; ++k) records[8 * (i + k) + c] += share[k];
-                }
-            }
+/// Sums of the light of all directions in R, G and B, in both kinds of rows; integers, so that no order of directions
+/// changes them.
+struct SkySums {
+    static constexpr float kWhole = 1 << 30; // of all directions
+
+    std::vector<uint32_t> rows[2][3];
+
+    explicit SkySums(const int n[3]) {
+        for (int across_z = 0; across_z < 2; ++across_z)
+            for (auto &channel : rows[across_z]) channel.resize(Rows(n, across_z).size());
     }
+
+    /// Adds e^(-k n - body), k for R, G and B, of one direction.
+    template <int count> void add(const SweptVoxels *const (&voxels)[count], const Sky &sky, const float direction[3]) {
+        auto &to = rows[dominant(direction) == 2];
+        const float share = kWhole / sky.count;
+        sweep(voxels, sky.spacing, direction, [&](size_t at, const Floats (&tau)[count]) RINGLET_ALWAYS {
+            for (int c = 0; c < 3; ++c) {
+                const Floats depth = count == 2 ? sky.loss[c] * tau[0] + tau[count - 1] : sky.loss[c] * tau[0];
+                Ints sums;
+                __builtin_memcpy(&sums, to[c].data() + at, sizeof sums);
+                sums += whole(exponential(-depth) * share + 0.5f);
+                __builtin_memcpy(to[c].data() + at, &sums, sizeof sums);
+            }
+        });
+    }
+
+    void add(const SkySums &others) {
+        for (int across_z = 0; across_z < 2; ++across_z)
+            for (int c = 0; c < 3; ++c)
+                for (size_t i = 0; i < rows[across_z][c].size(); ++i) rows[across_z][c][i] += others.rows[across_z][c][i];
+    }
+};
+
+/// Writes the mean of e^(-k n - body) over all directions to entries 0, 1, 2 of records (nx, ny, nz, 8).
+inline void write_transmittance(const Sky &sky, float *records, int threads) {
+    const SweptVoxels hair(sky.hair.data(), sky.n, threads);
+    const std::optional<SweptVoxels> body = sky.body.empty() ? std::nullopt : std::optional<SweptVoxels>({sky.body.data(), sky.n, threads});
+    SkySums all(sky.n);
+#pragma omp parallel num_threads(threads)
+    {
+        SkySums own(sky.n);
+#pragma omp for schedule(dynamic, 1) nowait
+        for (int d = 0; d < sky.count; ++d) {
+            if (body) own.add<2>({&hair, &*body}, sky, sky.directions + 3 * d);
+            else own.add<1>({&hair}, sky, sky.directions + 3 * d);
+        }
+#pragma omp critical
+        all.add(own);
+    }
+    const Rows straight(sky.n, false), across(sky.n, true);
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (int x = 0; x < sky.n[0]; ++x)
+        for (int c = 0; c < 3; ++c) {
+            const uint32_t *first = all.rows[0][c].data(), *other = all.rows[1][c].data();
+            straight.each(x, [&](size_t at, size_t voxel) RINGLET_ALWAYS { records[8 * voxel + c] = float(first[at]) * (1 / SkySums::kWhole); });
+            across.each(x, [&](size_t at, size_t voxel) RINGLET_ALWAYS { records[8 * voxel + c] += float(other[at]) * (1 / SkySums::kWhole); });
+        }
 }
 
 /// Writes minus the gradient of the smoothed hair to entries 4, 5, 6 of the records.

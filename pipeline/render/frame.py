@@ -81,7 +81,7 @@ class _Lit:
 
     def beside(self, strands: Expansion, count: int) -> "_Lit":
         """Another one for the same strands and lights."""
-        return _Lit(Chunks(copy(strands), count), copy(self.lighting))
+        return _Lit(Chunks(copy(strands), count), self.lighting.beside())
 
 
 class FrameRenderer:

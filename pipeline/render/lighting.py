@@ -5,6 +5,7 @@ holds the strands that are drawn, so that fewer, wider strands cover and shadow 
 """
 
 import math
+from copy import copy
 from dataclasses import dataclass
 from typing import Final
 
@@ -51,8 +52,8 @@ class _Shadowed:
     pose: _F64
     hair: _F32
     """(nx, ny, nz) [1/m]: strands per length of a ray."""
-    body: _F32
-    """(nx, ny, nz) [1/m]: the head as an almost opaque solid."""
+    body: _F32 | None
+    """(nx, ny, nz) [1/m]: the head as an almost opaque solid; None where there is none."""
 
 
 class Lighting:
@@ -74,7 +75,14 @@ class Lighting:
             .astype(np.float32)
         )
         self._grid: kernels.DensityGrid | None = None
+        self._shadows = kernels.Shadows(self._directions)  # its maps keep their memory from frame to frame
         self._frame: _Shadowed | None = None
+
+    def beside(self) -> "Lighting":
+        """Another one with the same lights, for the frames between."""
+        other = copy(self)
+        other._shadows = kernels.Shadows(self._directions)
+        return other
 
     def begin(self, lower: _F64, upper: _F64, width: float, points: int = 0) -> None:
         """Start a frame: bounds (3,) float64 [m] of all strands, a typical drawn width [m], how many points all have.
@@ -94,9 +102,7 @@ class Lighting:
         self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width)
         low = np.asarray(lower, np.float64)
         self._every = max(math.ceil((points / _CASTERS) ** 0.7), 1)
-        self._shadows = kernels.Shadows(
-            self._directions, low, low + size, spacing / _FINER, width, 1 / self._every
-        )
+        self._shadows.begin(low, low + size, spacing / _FINER, width, 1 / self._every)
         self._added = 0
         self._frame = None
 
@@ -119,9 +125,8 @@ class Lighting:
         grid = self._started()
         origin = np.array(grid.origin)
         density = grid.density()
-        if head is None:
-            body = np.zeros(grid.shape, np.float32)
-        else:
+        body = None
+        if head is not None:
             body = kernels.body_density(head, pose, grid.shape, origin, grid.spacing)
         # A fibre seen from all sides shows pi / 4 of its length * width
         hair = density * np.float32(np.pi / 4)
@@ -141,7 +146,9 @@ class Lighting:
     def veil(self, eye: _F64, wider: float) -> Veil:
         """What hair and head hide from an eye (3,) [m], when strands are drawn `wider` than they shadow."""
         frame = self._finished()
-        density = np.float32(wider) * frame.hair + np.float32(_OPAQUE) * frame.body
+        density = np.float32(wider) * frame.hair
+        if frame.body is not None:
+            density += np.float32(_OPAQUE) * frame.body
         return Veil(density, np.array(frame.light.origin), frame.light.spacing, eye)
 
     def shader(self, eye: _F64) -> kernels.FibreShader:

@@ -33,7 +33,8 @@ class Room:
     def light(self, directions: _F64, irradiance: float = 1.0, glints: bool = False) -> kernels.Illumination:
         """These depths for lights in these directions (L, 3)."""
         corner, n = np.ones(3), 4
-        shadows = kernels.Shadows(directions.astype(np.float32), -corner, corner, 0.5, 1e-9)
+        shadows = kernels.Shadows(directions.astype(np.float32))
+        shadows.begin(-corner, corner, 0.5, 1e-9)
         shadows.finish(np.zeros((1, 1, 1), np.float32), corner, 1.0, None, np.eye(4))
         for index in range(len(directions)):
             surface, layers, solid = shadows.map(index)

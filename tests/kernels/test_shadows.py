@@ -24,7 +24,8 @@ def straight(count: int, seed: int) -> tuple[_F32, _F32]:
 
 
 def shadows(points: _F32, widths: _F32, chunk: int = 10**9, share: float = 1.0) -> kernels.Shadows:
-    maps = kernels.Shadows(LIGHTS, LOW, HIGH, SPACING, WIDTH, share)
+    maps = kernels.Shadows(LIGHTS)
+    maps.begin(LOW, HIGH, SPACING, WIDTH, share)
     for first in range(0, len(points), chunk):
         maps.add(points[first : first + chunk], widths[first : first + chunk])
     maps.finish(np.zeros((4, 4, 4), np.float32), LOW, 0.02, None, np.eye(4))
@@ -103,7 +104,8 @@ def test_the_heads_shadow_has_its_edge_where_it_should() -> None:
     ball = kernels.DistanceField(
         (np.linalg.norm(grid, axis=-1) - 0.01).astype(np.float32), np.full(3, -(n // 2) * h), h
     )
-    maps = kernels.Shadows(LIGHTS, LOW, HIGH, SPACING, WIDTH)
+    maps = kernels.Shadows(LIGHTS)
+    maps.begin(LOW, HIGH, SPACING, WIDTH)
     maps.finish(np.zeros((1, 1, 1), np.float32), LOW, 1.0, ball, np.eye(4))
     radii = np.linspace(0.005, 0.015, 201)
     turn = np.linspace(0, 2 * np.pi, 40)[:, None]
@@ -148,8 +150,8 @@ def test_broken_strands_and_points_outside_do_no_harm() -> None:
 
 def test_wrong_shadows_are_refused() -> None:
     with pytest.raises(ValueError, match="unit"):
-        kernels.Shadows(2 * LIGHTS, LOW, HIGH, SPACING, WIDTH)
+        kernels.Shadows(2 * LIGHTS)
     with pytest.raises(ValueError, match="2000 spacings"):
-        kernels.Shadows(LIGHTS, LOW, HIGH, 1e-5, WIDTH)
+        kernels.Shadows(LIGHTS).begin(LOW, HIGH, 1e-5, WIDTH)
     with pytest.raises(ValueError, match="finish"):
-        kernels.Shadows(LIGHTS, LOW, HIGH, SPACING, WIDTH).reach(0, np.zeros((1, 3), np.float32))
+        kernels.Shadows(LIGHTS).reach(0, np.zeros((1, 3), np.float32))
