@@ -32,16 +32,13 @@ struct Touch {
         const float reach = s.reach(), dx = s.ux * s.length, dy = s.uy * s.length;
         const TileLanes x = middle.x + (left - s.x), y = middle.y + (top - s.y);
         const float wide = kTile * 0.5f * (std::abs(s.ux) + std::abs(s.uy)) + reach, far = kTile * 0.5f + reach;
-        tiles = (size(x * s.uy - y * s.ux) <= wide) & (size(x - 0.5f * dx) <= far + 0.5f * std::abs(dx)) &
-                (size(y - 0.5f * dy) <= far + 0.5f * std::abs(dy));
+        tiles = (magnitude(x * s.uy - y * s.ux) <= wide) & (magnitude(x - 0.5f * dx) <= far + 0.5f * std::abs(dx)) &
+                (magnitude(y - 0.5f * dy) <= far + 0.5f * std::abs(dy));
         const TileLanes t = (x * s.ux + y * s.uy) * s.inverse;
-        depth = s.d + s.dd * minimum<float>(maximum<float>(t, splat(0.0f)), splat(1.0f));
-        const float spread = std::abs(s.dd) * s.inverse * (0.75f * kTile);
-        nearest = maximum<float>(depth - spread, splat(std::min(s.d, s.d + s.dd)));
+        depth = s.d() + s.dd() * minimum<float>(maximum<float>(t, splat(0.0f)), splat(1.0f));
+        const float spread = std::abs(s.dd()) * s.inverse * (0.75f * kTile);
+        nearest = maximum<float>(depth - spread, splat(std::min(s.d(), s.d() + s.dd())));
     }
-
-  private:
-    static RINGLET_INLINE TileLanes size(TileLanes a) { return a < 0 ? -a : a; }
 };
 
 /// Calls visit(block, left, top) for the blocks that the box around a segment touches.
@@ -74,12 +71,13 @@ struct TilePixels {
     void remove(int x, int y) { rows[y] &= ~(1u << x), columns[x] &= ~(1u << y); }
 };
 
-/// The middles of a tile's rows.
+/// A tile's rows, or columns: their numbers and middles.
 struct TileSteps {
+    Mask<float> line;
     Floats middle;
 
     TileSteps() {
-        for (int k = 0; k < kTile; ++k) middle[k] = float(k) + 0.5f;
+        for (int k = 0; k < kTile; ++k) line[k] = k, middle[k] = float(k) + 0.5f;
     }
 };
 

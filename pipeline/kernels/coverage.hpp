@@ -34,7 +34,8 @@ RINGLET_INLINE float sum_cells(Cells a) {
     typedef float Quarter __attribute__((vector_size(16)));
     const Half h = __builtin_shufflevector(a, a, 0, 1, 2, 3, 4, 5, 6, 7) + __builtin_shufflevector(a, a, 8, 9, 10, 11, 12, 13, 14, 15);
     const Quarter q = __builtin_shufflevector(h, h, 0, 1, 2, 3) + __builtin_shufflevector(h, h, 4, 5, 6, 7);
-    return (q[0] + q[2]) + (q[1] + q[3]);
+    const Quarter pairs = q + __builtin_shufflevector(q, q, 2, 3, 0, 1);
+    return pairs[0] + pairs[1];
 }
 
 /// A segment where it crosses a pixel.
@@ -54,8 +55,7 @@ RINGLET_INLINE Cells covered(const Segment &s, const Crossing &at, const CellCen
     constexpr float inverse = kCells, half_cell = 0.5f / kCells, near_end = 0.75f;
     const float half = s.h + at.t * s.dh;
     const Cells v = at.across + s.ux * cell.y - s.uy * cell.x;
-    const Cells apart = v < 0 ? -v : v;
-    Cells part = clamp_cells((half + half_cell - apart) * inverse, 0, std::min(1.0f, 2 * inverse * half));
+    Cells part = clamp_cells((half + half_cell - magnitude(v)) * inverse, 0, std::min(1.0f, 2 * inverse * half));
     if (at.along < near_end || at.along > s.length - near_end) {
         const Cells u = at.along + s.ux * cell.x + s.uy * cell.y;
         part *= clamp_cells((s.length - u) * inverse + 0.5f, 0, 1) - clamp_cells(u * -inverse + 0.5f, 0, 1);

@@ -153,7 +153,7 @@ class Painter {
         for (const uint32_t i : uncoloured_) {
             const SeenPoint *ends = bins_.seen(number_[i]);
             for (int c = 0; c < 3; ++c) {
-                segments_[i].colour[c] = ends[0].colour[c];
+                segments_[i].shown[c] = ends[0].colour[c];
                 segments_[i].gain[c] = ends[1].colour[c] - ends[0].colour[c];
             }
         }

@@ -125,26 +125,32 @@ inline bool clipped(const View &view, const ScreenStrand &s, const float *widths
     return true;
 }
 
+/// Linear RGB and depth.
+typedef float Shown __attribute__((vector_size(16)));
+
 /// A segment on the screen; depth, half width and colour are linear along it.
 struct alignas(64) Segment {
     float x, y;            // where it begins
     float ux, uy;          // unit direction
     float length, inverse; // [px], [1/px]
-    float d, dd, h, dh;    // at the beginning, and what they gain up to the end
-    float colour[3], gain[3];
+    float h, dh;           // half width at the beginning, and what it gains up to the end
+    Shown shown, gain;     // the same of colour and depth
 
     Segment() = default;
 
-    Segment(const ScreenPoint &a, const ScreenPoint &b) : x(a.x), y(a.y), d(a.d), dd(b.d - a.d), h(a.h), dh(b.h - a.h) {
+    Segment(const ScreenPoint &a, const ScreenPoint &b) : x(a.x), y(a.y), h(a.h), dh(b.h - a.h), shown{0, 0, 0, a.d}, gain{0, 0, 0, b.d - a.d} {
         const float dx = b.x - a.x, dy = b.y - a.y;
         length = std::sqrt(dx * dx + dy * dy), inverse = 1 / length;
         ux = dx * inverse, uy = dy * inverse;
     }
 
+    float d() const { return shown[3]; }
+    float dd() const { return gain[3]; }
+
     /// Whether it can be drawn: all of it finite, and neither endless nor a point.
     bool drawable() const {
         const float most = std::max({std::abs(x), std::abs(y), std::abs(x + ux * length), std::abs(y + uy * length), h, h + dh});
-        return most < kOutermost && length >= kShortest && std::isfinite(x + y + d + dd + h + dh + length);
+        return most < kOutermost && length >= kShortest && std::isfinite(x + y + d() + dd() + h + dh + length);
     }
 
     /// Half width [px] at most, with the cells that it covers beyond.

@@ -88,9 +88,28 @@ template <class Real> RINGLET_INLINE Real smallest(Lanes<Real> a) {
     return m;
 }
 
-template <class Real> RINGLET_INLINE Lanes<Real> maximum(Lanes<Real> a, Lanes<Real> b) { return a > b ? a : b; }
+/// a > b ? a : b, as one instruction: where b is a constant, the compiler makes two of it.
+template <class Real> RINGLET_INLINE Lanes<Real> maximum(Lanes<Real> a, Lanes<Real> b) {
+#ifdef __AVX512F__
+    if constexpr (sizeof(Real) == 4) return Lanes<Real>(_mm512_maskz_max_ps(0xffff, __m512(a), __m512(b)));
+    else return Lanes<Real>(_mm512_maskz_max_pd(0xff, __m512d(a), __m512d(b)));
+#else
+    return a > b ? a : b;
+#endif
+}
 
-template <class Real> RINGLET_INLINE Lanes<Real> minimum(Lanes<Real> a, Lanes<Real> b) { return a < b ? a : b; }
+/// a < b ? a : b, as one instruction.
+template <class Real> RINGLET_INLINE Lanes<Real> minimum(Lanes<Real> a, Lanes<Real> b) {
+#ifdef __AVX512F__
+    if constexpr (sizeof(Real) == 4) return Lanes<Real>(_mm512_maskz_min_ps(0xffff, __m512(a), __m512(b)));
+    else return Lanes<Real>(_mm512_maskz_min_pd(0xff, __m512d(a), __m512d(b)));
+#else
+    return a < b ? a : b;
+#endif
+}
+
+/// Without its sign.
+RINGLET_INLINE Lanes<float> magnitude(Lanes<float> a) { return Lanes<float>(Mask<float>(a) & 0x7fffffff); }
 
 /// x rounded to the nearest integer: adding 1.5 2^52 (2^23) leaves no digits after the point.
 template <class Real> RINGLET_INLINE Lanes<Real> nearest(Lanes<Real> x) {
@@ -120,6 +139,18 @@ template <class Real> RINGLET_INLINE bool any(Mask<Real> mask) {
     for (int64_t word : words) bits |= word;
     return bits != 0;
 #endif
+}
+
+/// Writes the lanes of a that are set, one after the other, and how many there are comes back. All of
+/// to[0 .. kLanes - 1] may be written to.
+RINGLET_INLINE int write_chosen(Mask<float> mask, Mask<float> a, int32_t *to) {
+    const uint32_t bits = set_lanes<float>(mask);
+#ifdef __AVX512F__
+    _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(__mmask16(bits), __m512i(a)));
+#else
+    for (uint32_t left = bits; left; left &= left - 1) *to++ = a[__builtin_ctz(left)];
+#endif
+    return __builtin_popcount(bits);
 }
 
 /// Writes the numbers of the lanes that are set, counted from `first`, one after the other, and how many there are

@@ -47,18 +47,19 @@ class Tile {
     /// Starts a tile, of which these pixels are wanted.
     void begin(int tile, const TilePixels &wanted) {
         left_ = view_.left(tile), top_ = view_.top(tile);
+        for (int k = 0; k < kTile; ++k) x_[k] = float(left_ + k) + 0.5f, y_[k] = float(top_ + k) + 0.5f;
         drawn_ = wanted;
         open_ = TilePixels::all();
-        open_count_ = kPixels;
+        open_count_ = kPixels, shallowest_ = 2;
         std::memset(window_, 0, sizeof window_);
-        std::memset(colour_, 0, sizeof colour_);
+        std::memset(shown_, 0, sizeof shown_);
         std::memset(most_, 0, sizeof most_);
         for (int p = 0; p < kPixels; ++p) {
             const int x = left_ + p % kTile, y = top_ + p / kTile;
             T_[p] = splat(1.0f), clear_[p] = 1;
             nearest_[p] = 2, farthest_[p] = -1;
             if (x >= view_.W || y >= view_.H || !drawn_.has(p % kTile, p / kTile)) {
-                close(p);
+                clear_[p] = 0, close(p);
                 continue;
             }
             for (int j = 0; j < back_.n; ++j)
@@ -66,6 +67,7 @@ class Tile {
                     const float d = back_.depth[back_.sample(view_, x, y, i, j)];
                     nearest_[p] = std::min(nearest_[p], d), farthest_[p] = std::max(farthest_[p], d);
                 }
+            shallowest_ = std::min(shallowest_, farthest_[p]);
         }
     }
 
@@ -92,26 +94,16 @@ class Tile {
 
     /// Adds the fragments of segment `number` of the block, in the pixels that are still open of those it has reached.
     RINGLET_INLINE void draw(const Segment *segments, uint32_t number, const Words &reached) {
-        const Segment &s = segments[number];
-        const bool rows = steep(s);
-        const Words open = reached & (rows ? open_.rows : open_.columns);
-        alignas(64) uint32_t pixels[kTile];
-        std::memcpy(pixels, &open, sizeof pixels);
-        for (uint32_t left = set_lanes<float>((Mask<float>)open != 0); left; left &= left - 1) {
-            const int p = __builtin_ctz(left);
-            for (uint32_t bits = pixels[p]; bits; bits &= bits - 1) {
-                const int q = __builtin_ctz(bits), pixel = rows ? p * kTile + q : q * kTile + p;
-                const float d = s.d + crossing(s, pixel).t * s.dd;
-                if (d <= farthest_[pixel]) hold(segments, pixel, fragment(d, number));
-            }
-        }
+        int32_t pixel[kPixels + kLanes<float>], depth[kPixels + kLanes<float>];
+        const int count = fragments(segments[number], reached, pixel, depth);
+        for (int i = 0; i < count; ++i) hold(segments, uint32_t(pixel[i]), int64_t(depth[i]) << 32 | (number + 1));
     }
 
     /// Composites what is held back.
     void finish(const Segment *segments) {
         for (int p = 0; p < kPixels; ++p)
-            for (const uint64_t held : window_[p])
-                if (held) composite(segments, p, held);
+            for (int i = 0; i < kWindow; ++i)
+                if (window_[p][i]) composite(segments, uint32_t(p), window_[p][i]);
     }
 
     /// The pixels that are open and see beyond a depth.
@@ -133,7 +125,7 @@ class Tile {
             // What a closed pixel has not seen is as the rest of it
             const bool open = is_open(p);
             const float scale = open ? 1 : 1 / (1 - clear_[p]);
-            for (int c = 0; c < 3; ++c) to[c] = colour_[p][c] * scale + (open ? behind[c] : 0);
+            for (int c = 0; c < 3; ++c) to[c] = shown_[p][c] * scale + (open ? behind[c] : 0);
         }
     }
 
@@ -146,6 +138,8 @@ class Tile {
     }
 
   private:
+    typedef int64_t Held __attribute__((vector_size(16))); // kWindow fragments
+
     struct Most {
         float part;
         uint32_t number;
@@ -155,53 +149,74 @@ class Tile {
     const Backdrop &back_;
     const bool names_;
     int left_ = 0, top_ = 0; // [px]
+    float x_[kTile], y_[kTile]; // [px] of the pixels' centres
     Cells T_[kPixels];
-    float clear_[kPixels], colour_[kPixels][3];  // mean of T; linear RGB
+    float clear_[kPixels]; // mean of T; 0 where nothing is drawn
+    Shown shown_[kPixels]; // sum of what was taken
     float nearest_[kPixels], farthest_[kPixels]; // depth of the backdrop
-    uint64_t window_[kPixels][kWindow];          // fragments, ascending
+    Held window_[kPixels]; // fragments, ascending
     Most most_[kPixels];
+    float shallowest_; // of the backdrop's farthest depths
     TilePixels open_, drawn_;
     int open_count_ = 0;
     CellCentres centres_;
     TileSteps step_;
 
-    bool is_open(int p) const { return open_.has(p % kTile, p / kTile); }
+    bool is_open(int p) const { return clear_[p] >= kClosed; }
 
     void close(int p) {
         open_.remove(p % kTile, p / kTile);
         --open_count_;
     }
 
-    RINGLET_INLINE Crossing crossing(const Segment &s, int p) const {
-        return Crossing(s, float(left_ + p % kTile) + 0.5f, float(top_ + p / kTile) + 0.5f);
+    /// The open pixels that a segment has reached, in front of the backdrop, and the bits of its depth there.
+    RINGLET_INLINE int fragments(const Segment &s, const Words &reached, int32_t *pixel, int32_t *depth) const {
+        const bool rows = steep(s);
+        const bool behind = std::max(s.d(), s.d() + s.dd()) > shallowest_;
+        const float x = float(left_) - s.x, y = float(top_) - s.y;
+        const float line0 = rows ? y : x, first0 = rows ? x : y, by_line = rows ? s.uy : s.ux, by_first = rows ? s.ux : s.uy;
+        const Floats start = (step_.middle + line0) * by_line;
+        int count = 0;
+        for (Words left = reached & (rows ? open_.rows : open_.columns); any<float>((Mask<float>)left != 0); left &= left - 1) {
+            // The first pixel of each line, by the exponent of its bit
+            const Mask<float> bit = (Mask<float>)(left & -left);
+            const Mask<float> first = bit == 0 ? bit : ((Mask<float>)__builtin_convertvector(bit, Floats) >> 23) - 127;
+            const Mask<float> p = rows ? step_.line * kTile + first : first * kTile + step_.line;
+            const Floats along = start + (__builtin_convertvector(first, Floats) + (0.5f + first0)) * by_first;
+            const Floats d = s.d() + s.dd() * minimum<float>(maximum<float>(along * s.inverse, splat(0.0f)), splat(1.0f));
+            Mask<float> some = bit != 0;
+            if (behind) some &= d <= gather_floats(farthest_, p);
+            write_chosen(some, p, pixel + count);
+            count += write_chosen(some, (Mask<float>)d, depth + count);
+        }
+        return count;
     }
 
+    RINGLET_INLINE Crossing crossing(const Segment &s, uint32_t p) const { return Crossing(s, x_[p % kTile], y_[p / kTile]); }
+
     /// Puts a fragment into its pixel's window; the nearest that the window has no room for is composited.
-    RINGLET_INLINE void hold(const Segment *segments, int p, uint64_t next) {
-        uint64_t *window = window_[p];
-        const uint64_t out = std::min(next, window[0]);
-        for (int i = 0; i < kWindow; ++i) {
-            const uint64_t later = std::max(next, window[i]);
-            window[i] = i + 1 < kWindow ? std::min(later, window[i + 1]) : later;
-            next = later;
-        }
+    RINGLET_INLINE void hold(const Segment *segments, uint32_t p, int64_t next) {
+        const Held every = Held{} + next, held = window_[p], later = every > held ? every : held;
+        const Held after = {held[1], INT64_MAX};
+        const int64_t out = (every < held ? every : held)[0];
+        window_[p] = later < after ? later : after;
         if (out) composite(segments, p, out);
     }
 
-    RINGLET_INLINE void composite(const Segment *segments, int p, uint64_t held) {
+    RINGLET_INLINE void composite(const Segment *segments, uint32_t p, int64_t held) {
         if (!is_open(p)) return;
         const Segment &s = segments[uint32_t(held) - 1];
         const Crossing at = crossing(s, p);
         Cells part = covered(s, at, centres_);
-        const float depth = s.d + at.t * s.dd;
-        if (depth > nearest_[p]) part = in_front(part, depth, left_ + p % kTile, top_ + p / kTile);
+        const Shown shown = s.shown + at.t * s.gain;
+        if (shown[3] > nearest_[p]) part = in_front(part, shown[3], left_ + int(p % kTile), top_ + int(p / kTile));
         const Cells taken = T_[p] * part;
         T_[p] -= taken;
         const float weight = sum_cells(taken) * (1.0f / (kCells * kCells));
-        for (int c = 0; c < 3; ++c) colour_[p][c] += weight * (s.colour[c] + at.t * s.gain[c]);
+        shown_[p] += weight * shown;
         clear_[p] -= weight;
         if (names_ && weight > most_[p].part) most_[p] = {weight, uint32_t(held) - 1};
-        if (clear_[p] < kClosed) close(p);
+        if (!is_open(p)) close(p);
     }
 
     /// Coverage of the cells whose backdrop is not in front of the depth.
