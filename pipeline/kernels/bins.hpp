@@ -162,11 +162,15 @@ struct Bins {
             const float columns = float(across - 1), rows = float(view.down() * kSide - 1);
             const Mask<float> a0 = place(x0 * per_tile, columns), a1 = place(x1 * per_tile, columns);
             const Mask<float> b0 = place(y0 * per_tile, rows), b1 = place(y1 * per_tile, rows);
-            const Floats deepest = maximum<float>(gather_floats(around.data(), b0 * across + a0), gather_floats(around.data(), b1 * across + a1));
-            const Mask<float> far = (a0 - a1 > 2) | (a1 - a0 > 2) | (b0 - b1 > 2) | (b1 - b0 > 2) | (wide > float(kTile));
+            const Mask<float> a = place((x0 + x1) * (0.5f * per_tile), columns), b = place((y0 + y1) * (0.5f * per_tile), rows);
+            // The tiles around the middle join those around the ends as long as the ends are no more than four tiles apart
+            const Floats deepest = maximum<float>(maximum<float>(at_most(b0 * across + a0), at_most(b1 * across + a1)), at_most(b * across + a));
+            const Mask<float> far = (a0 - a1 > 4) | (a1 - a0 > 4) | (b0 - b1 > 4) | (b1 - b0 > 4) | (wide > float(kTile));
             const uint32_t passed = set_lanes<float>(inside & (far | (minimum<float>(d0, d1) <= deepest)));
             return passed & ((1u << std::min(strands.P - 1 - j, 16)) - 1);
         }
+
+        RINGLET_INLINE Floats at_most(Mask<float> tile) const { return gather_floats(around.data(), tile); }
 
         static RINGLET_INLINE Floats read(const std::vector<float> &from, int j) {
             Floats lanes;
