@@ -113,9 +113,11 @@ class Lighting:
         """
         grid = self._started()
         if self._every > 1:
-            group, place = np.divmod(np.arange(self._added, self._added + len(points)), self._every)
-            chosen = np.flatnonzero(np.floor(uniform(0, group, _CASTER) * self._every) == place)
-            self._added += len(points)
+            last = self._added + len(points)
+            group = np.arange(self._added // self._every, (last - 1) // self._every + 1)
+            chosen = self._every * group + np.floor(uniform(0, group, _CASTER) * self._every).astype(np.int64)
+            chosen = chosen[(chosen >= self._added) & (chosen < last)] - self._added
+            self._added = last
             points, widths = points[chosen], widths[chosen] * np.float32(self._every)
         grid.add(points, widths)
         self._shadows.add(points, widths)
