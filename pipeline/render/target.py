@@ -42,7 +42,8 @@ class Target:
         self.width, self.height = width, height
         self._window = _open_window()
         self._renderer = vtkRenderer()
-        self._renderer.SetBackground(*(encode(np.array(background)) / 255.0).tolist())
+        self._background = encode(np.array(background))
+        self._renderer.SetBackground(*(self._background / 255.0).tolist())
         self._window.SetOffScreenRendering(1)
         self._window.SetMultiSamples(0)
         self._window.SetSize(width, height)
@@ -55,7 +56,6 @@ class Target:
         self._actor.GetProperty().LightingOff()
         self._renderer.AddActor(self._actor)
         self._kept: list[Any] = []
-        self._blank: NDArray[np.uint8] | None = None
         self.blank = False
         """Whether there is nothing but the background since `background`."""
 
@@ -74,13 +74,8 @@ class Target:
         self._renderer.PreserveDepthBufferOff()
 
     def background(self) -> None:
-        """Draw nothing but the background."""
-        from vtkmodules.vtkCommonDataModel import vtkPolyData
-
-        if self._blank is None:
-            self._draw(vtkPolyData())
-            self._blank = self.read()[0, 0].copy()
-        self.blank = True  # it is drawn with what comes first
+        """Draw nothing but the background, which OpenGL need not do before there is more: it takes much memory."""
+        self.blank = True
 
     def triangles(self, points: Points, triangles: NDArray[np.integer[Any]], colours: Colours) -> None:
         """Draw triangles (T, 3) over points (N, 3) [m] with linear colours (N, 3)."""
@@ -118,8 +113,8 @@ class Target:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
-        if self.blank and self._blank is not None:
-            return np.tile(self._blank, (self.height, self.width, 1))
+        if self.blank:
+            return np.tile(self._background, (self.height, self.width, 1))
         pixels = vtkUnsignedCharArray()
         self._window.GetPixelData(0, 0, self.width - 1, self.height - 1, 0, pixels, 0)
         return np.asarray(vtk_to_numpy(pixels)).reshape(self.height, self.width, 3)[::-1]
