@@ -38,7 +38,7 @@ PRESETS: dict[str, Preset] = {
         (
             Light(direction=(0.55, 0.75, 0.80), colour=_WARM, irradiance=3.2),
             Light(direction=(-0.90, 0.25, 0.60), colour=_COOL, irradiance=0.8),
-            Light(direction=(-0.70, 0.45, -0.85), irradiance=1.4),
+            Light(direction=(-0.50, 0.58, -0.85), irradiance=1.4),
         ),
         (0.16, 0.16, 0.16),
     ),
