@@ -115,8 +115,9 @@ interpolation: env ## strands that follow guides against their own simulation; w
 performance: env ## all benchmarks, on an idle machine: eight minutes; writes docs/performance.md
 	$(RINGLET) bench page docs/performance.md
 
-gallery: env ## every style and every operator, rendered; writes docs/gallery.md and docs/operators.md
+gallery: env ## every style, colour and operator, rendered; writes docs/gallery.md, docs/colours.md and docs/operators.md
 	$(BIN)/python docs/gallery.py
+	$(BIN)/python docs/colours.py
 	$(BIN)/python docs/operators.py
 
 pathtracer: env ## the same hair by a path tracer and by ringlet, minutes; needs Mitsuba; writes docs/pathtracer.md

@@ -38,7 +38,7 @@ PRESETS: dict[str, Preset] = {
         (
             Light(direction=(0.55, 0.75, 0.80), colour=_WARM, irradiance=3.2),
             Light(direction=(-0.90, 0.25, 0.60), colour=_COOL, irradiance=0.8),
-            Light(direction=(-0.70, 0.40, -0.85), irradiance=1.8),
+            Light(direction=(-0.50, 0.58, -0.85), irradiance=1.4),
         ),
         (0.16, 0.16, 0.16),
     ),
@@ -54,15 +54,15 @@ PRESETS: dict[str, Preset] = {
         (
             Light(direction=(0.05, 0.85, 0.95), colour=_WARM, irradiance=3.2, softness=0.35),
             Light(direction=(0.0, -0.60, 0.90), irradiance=0.5, softness=0.8),
-            Light(direction=(0.0, 0.75, -0.90), irradiance=1.8, softness=0.2),
+            Light(direction=(0.0, 0.45, -0.90), irradiance=0.9, softness=0.2),
         ),
         (0.12, 0.12, 0.13),
     ),
     "rim": Preset(  # an outline on both sides of a dim face
         (
-            Light(direction=(0.95, 0.40, -0.60), colour=_WARM, irradiance=3.0),
-            Light(direction=(-0.95, 0.40, -0.60), colour=_COOL, irradiance=3.0),
-            Light(direction=(0.30, 0.40, 0.95), irradiance=0.35, softness=0.6),
+            Light(direction=(0.95, 0.40, -0.60), colour=_WARM, irradiance=2.4),
+            Light(direction=(-0.95, 0.40, -0.60), colour=_COOL, irradiance=2.4),
+            Light(direction=(0.30, 0.40, 0.95), irradiance=0.8, softness=0.6),
         ),
         (0.05, 0.05, 0.06),
     ),

@@ -32,13 +32,13 @@ class Stop(Section):
 
 class Fibre(Section):
     melanin: Fraction = 0.6
-    """0 is white, 0.2 blonde, 0.6 brown, 0.95 black."""
+    """How much pigment: 0 is white, 0.03 platinum, 0.12 blond, 0.3 dark blond, 0.5 light brown, 0.7 brown, 0.85 dark brown, 0.97 black."""
     redness: Fraction = 0.5
-    """Share of pheomelanin: 0 is ashen, 1 is red."""
+    """Share of pheomelanin: 0 is ashen, 1 golden, in dark hair chestnut; auburn and copper need a dye as well."""
     melanin_jitter: Fraction = 0.05
     """Spread of the melanin from strand to strand."""
     roughness: Annotated[float, Field(ge=0.1, le=1)] = 0.3
-    """Longitudinal roughness."""
+    """Longitudinal roughness: 0.15 is sleek, 0.3 usual, 0.45 dull; two highlights part from 0.2 down."""
     roughness_jitter: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Spread of the longitudinal roughness from strand to strand."""
     azimuthal_roughness: Annotated[float, Field(ge=0.1, le=1)] = 0.3
