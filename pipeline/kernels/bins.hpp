@@ -29,7 +29,6 @@ struct Entry {
 struct SeenPoint {
     static constexpr uint32_t kKnown = 1u << 31;
 
-    ScreenPoint at;
     float colour[3]; // linear RGB, once it is known
     uint32_t number; // of the point among those of the batch's strands, and whether its colour is known
 };
@@ -38,6 +37,7 @@ struct SeenPoint {
 struct Batch {
     static constexpr int kBits = 16;
 
+    Span<ScreenPoint> at; // apart from the rest, for each block looks at all of its segments
     Span<SeenPoint> seen;
     std::vector<Entry> entries; // until they are sorted by blocks
     Span<float> points, variation; // (n, P, 3) and (n, 3) of the n strands of which something is seen
@@ -46,15 +46,16 @@ struct Batch {
 
 /// A batch while it grows.
 struct OpenBatch {
+    std::vector<ScreenPoint> at;
     std::vector<SeenPoint> seen;
     std::vector<Entry> entries;
     std::vector<float> points, variation;
     std::vector<uint32_t> key;
 
-    void clear() { seen.clear(), entries.clear(), points.clear(), variation.clear(), key.clear(); }
+    void clear() { at.clear(), seen.clear(), entries.clear(), points.clear(), variation.clear(), key.clear(); }
 
     Batch store(Arena &arena) const {
-        return {arena.copy(seen), std::vector<Entry>(entries), arena.copy(points), arena.copy(variation), arena.copy(key)};
+        return {arena.copy(at), arena.copy(seen), std::vector<Entry>(entries), arena.copy(points), arena.copy(variation), arena.copy(key)};
     }
 };
 
@@ -70,7 +71,8 @@ struct Bins {
     static int strands_per_batch(int P) { return std::max(1, std::min(1024, (1 << Batch::kBits) / (2 * P))); }
 
     const Batch &batch(uint32_t number) const { return batches[number >> Batch::kBits]; }
-    SeenPoint *seen(uint32_t number) const { return batch(number).seen.data + (number & ((1u << Batch::kBits) - 1)); }
+    const ScreenPoint *at(uint32_t number) const { return batch(number).at.data + place(number); }
+    SeenPoint *seen(uint32_t number) const { return batch(number).seen.data + place(number); }
 
     void clear() { batches.clear(), arena.clear(); }
 
@@ -95,6 +97,8 @@ struct Bins {
     }
 
   private:
+    static uint32_t place(uint32_t number) { return number & ((1u << Batch::kBits) - 1); }
+
     /// The largest cut-off of each tile and its eight neighbours, row by row.
     std::vector<float> widest(const View &view) const {
         const int across = view.across() * kSide, down = view.down() * kSide;
@@ -146,7 +150,10 @@ struct Bins {
             const uint32_t segment = uint32_t(batch.seen.size()) - (goes_on ? 1 : 0);
             if (!visible(Segment(ends[0], ends[1]), name | segment)) return;
             // A point that the near plane has moved keeps its colour
-            for (int end = goes_on ? 1 : 0; end < 2; ++end) batch.seen.push_back({ends[end], {}, first + j + end});
+            for (int end = goes_on ? 1 : 0; end < 2; ++end) {
+                batch.at.push_back(ends[end]);
+                batch.seen.push_back({{}, first + j + end});
+            }
             last = j;
         }
 

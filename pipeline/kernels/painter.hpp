@@ -45,7 +45,7 @@ class Painter {
     }
 
   private:
-    static constexpr int kCount = kSide * kSide, kAhead = 8;
+    static constexpr int kCount = kSide * kSide, kAhead = 16;
     static constexpr size_t kPortion = 256; // entries that are shaded together
 
     const View &view_;
@@ -81,9 +81,9 @@ class Painter {
         for (int k = 0; k < kCount; ++k) waiting[k] = wrong[block * kCount + k] ? -1 : 0, entries_[k].clear();
         segments_.resize(count), number_.assign(number, number + count), shaded_.assign(count, 0);
         for (size_t i = 0; i < count; ++i) {
-            if (i + kAhead < count) __builtin_prefetch(bins_.seen(number[i + kAhead]));
-            const SeenPoint *ends = bins_.seen(number[i]);
-            const Segment &s = segments_[i] = Segment(ends[0].at, ends[1].at);
+            if (i + kAhead < count) fetch(bins_.at(number[i + kAhead]));
+            const ScreenPoint *ends = bins_.at(number[i]);
+            const Segment &s = segments_[i] = Segment(ends[0], ends[1]);
             const Touch touch(s, middle_, left, top);
             alignas(64) float depth[kCount];
             std::memcpy(depth, &touch.depth, sizeof depth);
@@ -119,11 +119,14 @@ class Painter {
         return lacking;
     }
 
+    /// Brings both ends of a segment near, which may lie in two lines of the cache.
+    template <class Point> static void fetch(const Point *ends) { __builtin_prefetch(&ends[0]), __builtin_prefetch(&ends[1]); }
+
     /// Notes that segment i of the block needs its colours.
     void want(uint32_t i) {
         if (shaded_[i]) return;
         shaded_[i] = 1;
-        __builtin_prefetch(bins_.seen(number_[i]));
+        fetch(bins_.seen(number_[i]));
         uncoloured_.push_back(i);
     }
 
