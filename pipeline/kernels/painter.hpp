@@ -47,6 +47,7 @@ class Painter {
   private:
     static constexpr int kCount = kSide * kSide, kAhead = 16;
     static constexpr size_t kPortion = 256; // entries that are shaded together
+    static constexpr size_t kLook = 32;     // entries from one look at which pixels are open to the next
 
     const View &view_;
     const std::vector<float> &solid_;
@@ -100,7 +101,7 @@ class Painter {
         const uint64_t certain = fragment(cut, UINT32_MAX - 1);
         TilePixels lacking = TilePixels::none();
         bool passed = false;
-        for (size_t k = 0; k < order_.size() && !tile_.closed(); k += kPortion) {
+        for (size_t k = 0; k < order_.size() && !tile_.closed(); k += kPortion, tile_.find_open()) {
             const size_t end = std::min(k + kPortion, order_.size()), count = end - k;
             const uint64_t *entry = order_.sorted(end) + k;
             for (size_t i = 0; i < count; ++i) {
@@ -110,6 +111,7 @@ class Painter {
             }
             shade();
             for (size_t i = 0; i < count && !tile_.closed(); ++i) {
+                if (i % kLook == kLook - 1) tile_.find_open();
                 if (!passed && entry[i] > certain) lacking = tile_.open_beyond(cut), passed = true;
                 tile_.draw(segments_.data(), drawn_[i], reached_[i]);
             }
@@ -144,6 +146,7 @@ class Painter {
             const uint32_t point = bins_.seen(number)->number & ~SeenPoint::kKnown, strand = point / uint32_t(bins_.P);
             to_shade_.push_back({batch.points.data + size_t(strand) * bins_.P * 3, batch.variation.data + 3 * size_t(strand),
                                  batch.key[strand], int(point - strand * uint32_t(bins_.P))});
+            __builtin_prefetch(batch.points.data + 3 * size_t(point)), __builtin_prefetch(to_shade_.back().root);
         }
         shaded += to_shade_.size();
         radiance_.resize(3 * to_shade_.size());

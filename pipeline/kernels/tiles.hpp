@@ -49,8 +49,7 @@ class Tile {
         left_ = view_.left(tile), top_ = view_.top(tile);
         for (int k = 0; k < kTile; ++k) x_[k] = float(left_ + k) + 0.5f, y_[k] = float(top_ + k) + 0.5f;
         drawn_ = wanted;
-        open_ = TilePixels::all();
-        open_count_ = kPixels, shallowest_ = 2;
+        shallowest_ = 2;
         std::memset(window_, 0, sizeof window_);
         std::memset(shown_, 0, sizeof shown_);
         std::memset(most_, 0, sizeof most_);
@@ -59,7 +58,7 @@ class Tile {
             T_[p] = splat(1.0f), clear_[p] = 1;
             nearest_[p] = 2, farthest_[p] = -1;
             if (x >= view_.W || y >= view_.H || !drawn_.has(p % kTile, p / kTile)) {
-                clear_[p] = 0, close(p);
+                clear_[p] = 0;
                 continue;
             }
             for (int j = 0; j < back_.n; ++j)
@@ -69,9 +68,21 @@ class Tile {
                 }
             shallowest_ = std::min(shallowest_, farthest_[p]);
         }
+        find_open();
     }
 
-    bool closed() const { return open_count_ == 0; }
+    /// Sees which pixels are open: now and then, for to keep account at each fragment costs more than a few too many.
+    void find_open() {
+        for (int y = 0; y < kTile; ++y) {
+            Floats clear;
+            std::memcpy(&clear, clear_ + y * kTile, sizeof clear);
+            open_.rows[y] = set_lanes<float>(clear >= kClosed);
+        }
+        for (int x = 0; x < kTile; ++x) open_.columns[x] = set_lanes<float>((Mask<float>)(open_.rows << (31 - x)));
+    }
+
+    /// Whether no pixel was open when that was seen last.
+    bool closed() const { return !open_.some(); }
 
     /// Writes the backdrop into these pixels of a tile without hair.
     void bare(int tile, const TilePixels &wanted, float *picture) const {
@@ -158,16 +169,10 @@ class Tile {
     Most most_[kPixels];
     float shallowest_; // of the backdrop's farthest depths
     TilePixels open_, drawn_;
-    int open_count_ = 0;
     CellCentres centres_;
     TileSteps step_;
 
     bool is_open(int p) const { return clear_[p] >= kClosed; }
-
-    void close(int p) {
-        open_.remove(p % kTile, p / kTile);
-        --open_count_;
-    }
 
     /// The open pixels that a segment has reached, in front of the backdrop, and the bits of its depth there.
     RINGLET_INLINE int fragments(const Segment &s, const Words &reached, int32_t *pixel, int32_t *depth) const {
@@ -216,7 +221,6 @@ class Tile {
         shown_[p] += weight * shown;
         clear_[p] -= weight;
         if (names_ && weight > most_[p].part) most_[p] = {weight, uint32_t(held) - 1};
-        if (!is_open(p)) close(p);
     }
 
     /// Coverage of the cells whose backdrop is not in front of the depth.
