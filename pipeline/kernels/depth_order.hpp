@@ -11,21 +11,21 @@ namespace ringlet {
 
 class DepthOrder {
   public:
-    /// Takes entries, depth << 32 | number, where depth is the bits of a positive float. Slices of depth hold about 32.
+    /// Takes entries, depth << 32 | number, where depth is the bits of a positive float. Slices of depth hold about 8.
     void begin(const std::vector<uint64_t> &entries) {
         count_ = entries.size(), sorted_ = 0, slice_ = 0;
         order_.resize(count_);
         if (count_ == 0) return;
         const auto [least, most] = std::minmax_element(entries.begin(), entries.end());
         const float first = depth(*least), span = depth(*most) - first;
-        const int slices = int(std::clamp<size_t>(count_ / 32, 1, kSlices));
+        const int slices = int(std::clamp<size_t>(count_ / 8, 1, kSlices));
         const float scale = span > 0 ? float(slices) / span : 0;
         const auto slice = [&](uint64_t entry) { return std::min(int((depth(entry) - first) * scale), slices - 1); };
         end_.assign(slices, 0);
         for (const uint64_t entry : entries) ++end_[slice(entry)];
-        size_t total = 0;
-        for (size_t &end : end_) {
-            const size_t size = end;
+        uint32_t total = 0;
+        for (uint32_t &end : end_) {
+            const uint32_t size = end;
             end = total, total += size;
         }
         for (const uint64_t entry : entries) order_[end_[slice(entry)]++] = entry;
@@ -41,10 +41,10 @@ class DepthOrder {
     }
 
   private:
-    static constexpr size_t kSlices = 1024;
+    static constexpr size_t kSlices = 4096;
 
     std::vector<uint64_t> order_;
-    std::vector<size_t> end_; // of each slice
+    std::vector<uint32_t> end_; // of each slice
     size_t count_ = 0, sorted_ = 0, slice_ = 0;
 
     static float depth(uint64_t entry) {
