@@ -17,7 +17,12 @@ struct Layers {
     static constexpr int kParts = (kTile / kCell) * (kTile / kCell);
     static constexpr int kSamples = 3;    // along a segment
 
-    std::vector<std::vector<uint32_t>> counts; // for each thread (tiles, kParts, kDepths)
+    std::vector<std::vector<uint32_t>> counts; // for each thread (tiles, kParts, kDepths); empty: nothing is counted yet
+
+    /// Forgets all counts, but keeps the memory.
+    void clear() {
+        for (auto &mine : counts) mine.clear();
+    }
 
     /// Adds those of strands (S, P) whose number, from `first` on, is divisible by kEvery.
     void add(const View &view, const float *points, const float *widths, int S, int P, size_t first, int threads) {

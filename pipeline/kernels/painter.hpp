@@ -18,8 +18,13 @@ class Painter {
     size_t shaded = 0; // points
 
     /// `solid` is the farthest depth of the backdrop in each tile.
-    Painter(const View &view, const Backdrop &back, const std::vector<float> &solid, Bins &bins, const PointShader &shader, const Pictures &pictures)
-        : view_(view), solid_(solid), bins_(bins), shader_(shader), pictures_(pictures), tile_(view, back, pictures.names) {}
+    Painter(const View &view, const std::vector<float> &solid, Bins &bins) : view_(view), solid_(solid), bins_(bins), tile_(view) {}
+
+    /// Starts a picture.
+    void begin(const Backdrop &back, const PointShader &shader, const Pictures &pictures) {
+        shaded = 0, shader_ = &shader, pictures_ = pictures;
+        tile_.over(back, pictures.names);
+    }
 
     /// Draws the wrong tiles of a block, and sets what is wrong with them now; how many of them still are.
     int block(int block, const uint32_t *number, size_t count, uint8_t *wrong, TilePixels *lacking) {
@@ -52,8 +57,8 @@ class Painter {
     const View &view_;
     const std::vector<float> &solid_;
     Bins &bins_;
-    const PointShader &shader_;
-    const Pictures &pictures_;
+    const PointShader *shader_ = nullptr;
+    Pictures pictures_{};
     Tile tile_;
     TileMiddles middle_;
     DepthOrder order_;
@@ -105,6 +110,7 @@ class Painter {
             const size_t end = std::min(k + kPortion, order_.size()), count = end - k;
             const uint64_t *entry = order_.sorted(end) + k;
             for (size_t i = 0; i < count; ++i) {
+                if (i + kAhead < count) __builtin_prefetch(&segments_[uint32_t(entry[i + kAhead]) - 1]);
                 drawn_[i] = uint32_t(entry[i]) - 1;
                 reached_[i] = tile_.reached(segments_[drawn_[i]]);
                 if (any<float>((Mask<float>)reached_[i] != 0)) want(drawn_[i]);
@@ -150,7 +156,7 @@ class Painter {
         }
         shaded += to_shade_.size();
         radiance_.resize(3 * to_shade_.size());
-        shader_.shade(to_shade_.data(), to_shade_.size(), bins_.P, radiance_.data());
+        shader_->shade(to_shade_.data(), to_shade_.size(), bins_.P, radiance_.data());
         for (size_t i = 0; i < unshaded_.size(); ++i) {
             SeenPoint &to = *bins_.seen(unshaded_[i]);
             for (int c = 0; c < 3; ++c) __atomic_store(&to.colour[c], &radiance_[3 * i + c], __ATOMIC_RELAXED);

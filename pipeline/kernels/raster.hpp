@@ -13,6 +13,8 @@
 
 #include <memory>
 
+#include <omp.h>
+
 namespace ringlet {
 
 class Raster {
@@ -31,13 +33,13 @@ class Raster {
     void begin(const View &seen) {
         view = seen;
         shaded = 0;
-        counted.counts.clear(), bins.cut.clear(), bins.wanted.clear(), bins.clear();
+        counted.clear(), bins.cut.clear(), bins.wanted.clear(), bins.clear();
     }
 
     /// Cuts off behind `layers` of hair, and behind the backdrop.
     void cut_off(const Backdrop &back, int threads) {
         bins.cut = counted.depths(view, layers, threads);
-        counted.counts.clear();
+        counted.clear();
         solid = deepest(back, threads);
         for (int tile = 0; tile < view.tiles(); ++tile) bins.cut[tile] = std::min(bins.cut[tile], solid[tile]);
         wrong.assign(view.tiles(), 1);
@@ -49,17 +51,19 @@ class Raster {
     int compose(const Backdrop &back, const PointShader &shader, const Pictures &pictures, int threads) {
         std::vector<TilePixels> lacking(view.tiles(), TilePixels::none());
         std::vector<size_t> begin;
-        const std::vector<uint32_t> segments = sorted_by_block(begin, threads);
+        sort_by_block(begin, threads);
+        while (int(painters_.size()) < threads) painters_.push_back(std::make_unique<Painter>(view, solid, bins));
         int count = 0;
         size_t points = 0;
 #pragma omp parallel num_threads(threads) reduction(+ : count, points)
         {
-            auto painter = std::make_unique<Painter>(view, back, solid, bins, shader, pictures);
+            Painter &painter = *painters_[size_t(omp_get_thread_num())];
+            painter.begin(back, shader, pictures);
 #pragma omp for schedule(dynamic, 1)
             for (int block = 0; block < view.across() * view.down(); ++block)
-                count += painter->block(block, segments.data() + begin[block], begin[block + 1] - begin[block], wrong.data(),
-                                        lacking.data());
-            points = painter->shaded;
+                count += painter.block(block, segments_.data() + begin[block], begin[block + 1] - begin[block], wrong.data(),
+                                       lacking.data());
+            points = painter.shaded;
         }
         shaded += points;
         bins.clear();
@@ -68,6 +72,10 @@ class Raster {
     }
 
   private:
+    // Both stay from picture to picture, for memory that is new costs time
+    std::vector<std::unique_ptr<Painter>> painters_; // of each thread
+    std::vector<uint32_t> segments_;                 // in the order of strands, block after block
+
     /// From now on only these pixels are wanted, and nothing before the backdrop is cut off.
     void only(std::vector<TilePixels> pixels) {
         for (int tile = 0; tile < view.tiles(); ++tile) bins.cut[tile] = wrong[tile] ? solid[tile] : -1;
@@ -97,8 +105,8 @@ class Raster {
         return depth;
     }
 
-    /// Segments in the order of strands, block after block: a counting sort, with counters for each thread.
-    std::vector<uint32_t> sorted_by_block(std::vector<size_t> &begin, int threads) {
+    /// Sorts the segments by blocks: a counting sort, with counters for each thread. `begin` says where each block's are.
+    void sort_by_block(std::vector<size_t> &begin, int threads) {
         const size_t blocks = size_t(view.across()) * view.down(), batches = bins.batches.size();
         std::vector<std::vector<size_t>> next(threads, std::vector<size_t>(blocks));
         const auto share = [&](int thread) { return batches * thread / threads; };
@@ -116,14 +124,13 @@ class Raster {
             }
         }
         begin[blocks] = total;
-        std::vector<uint32_t> segments(total);
+        if (segments_.size() < total) segments_.resize(total);
 #pragma omp parallel for schedule(static, 1) num_threads(threads)
         for (int thread = 0; thread < threads; ++thread)
             for (size_t b = share(thread); b < share(thread + 1); ++b) {
-                for (const Entry &entry : bins.batches[b].entries) segments[next[thread][entry.block]++] = entry.segment;
+                for (const Entry &entry : bins.batches[b].entries) segments_[next[thread][entry.block]++] = entry.segment;
                 bins.batches[b].entries = {};
             }
-        return segments;
     }
 };
 

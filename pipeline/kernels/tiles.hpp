@@ -41,8 +41,10 @@ class Tile {
     static constexpr int kWindow = 2;
     static constexpr float kClosed = 1.0f / 64;
 
-    /// With names, notes which segment takes most of each pixel.
-    Tile(const View &view, const Backdrop &back, bool names) : view_(view), back_(back), names_(names) {}
+    explicit Tile(const View &view) : view_(view) {}
+
+    /// From now on over another picture. With names, notes which segment takes most of each pixel.
+    void over(const Backdrop &back, bool names) { back_ = back, names_ = names; }
 
     /// Starts a tile, of which these pixels are wanted.
     void begin(int tile, const TilePixels &wanted) {
@@ -157,8 +159,8 @@ class Tile {
     };
 
     const View &view_;
-    const Backdrop &back_;
-    const bool names_;
+    Backdrop back_{};
+    bool names_ = false;
     int left_ = 0, top_ = 0; // [px]
     float x_[kTile], y_[kTile]; // [px] of the pixels' centres
     Cells T_[kPixels];
