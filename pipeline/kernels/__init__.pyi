@@ -841,6 +841,9 @@ def shade_surface(
 
 # --- pixels (develop.hpp) ---------------------------------------------------------------------------
 
+def turn_over(picture: NDArray[np.uint8] | _F32) -> None:
+    """Turns a picture upside down, in place: (H, W, 3) uint8, or (H, W) float32."""
+
 def average(samples: NDArray[np.uint8], per_side: int, decode: _F32) -> _F32:
     """Linear pixels (H, W, 3) float32 of encoded samples (H n, W n, 3), averaged over n x n = per_side x per_side.
 

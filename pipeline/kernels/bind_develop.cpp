@@ -18,6 +18,13 @@ static nb::ndarray<nb::numpy, float> average_samples(Array<const uint8_t, -1, -1
     return pixels;
 }
 
+template <class Picture> static void turn_picture_over(Picture picture) {
+    const size_t H = picture.shape(0), row = H ? picture.size() / H : 0;
+    auto *values = picture.data();
+    nb::gil_scoped_release release;
+    turn_over(values, H, row, threads());
+}
+
 template <class Code>
 static nb::ndarray<nb::numpy, Code> develop_pixels(Array<const float, -1, -1, 3> linear, Array<const Code, -1> encode,
                                                    float scale) {
@@ -33,6 +40,8 @@ static nb::ndarray<nb::numpy, Code> develop_pixels(Array<const float, -1, -1, 3>
 
 void bind_develop(nb::module_ &m) {
     m.def("average", &average_samples, nb::arg("samples"), nb::arg("per_side"), nb::arg("decode"));
+    m.def("turn_over", &turn_picture_over<Array<uint8_t, -1, -1, 3>>, nb::arg("picture").noconvert());
+    m.def("turn_over", &turn_picture_over<Array<float, -1, -1>>, nb::arg("picture").noconvert());
     m.def("develop", &develop_pixels<uint8_t>, nb::arg("linear"), nb::arg("encode").noconvert(), nb::arg("scale"));
     m.def("develop", &develop_pixels<uint16_t>, nb::arg("linear"), nb::arg("encode").noconvert(), nb::arg("scale"));
 }

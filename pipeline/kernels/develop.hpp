@@ -25,6 +25,12 @@ inline void average(const uint8_t *samples, float *pixels, size_t H, size_t W, i
     }
 }
 
+/// Turns a picture of H rows of so many values upside down, in place.
+template <class Value> void turn_over(Value *values, size_t H, size_t row, int threads) {
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (size_t y = 0; y < H / 2; ++y) std::swap_ranges(values + y * row, values + (y + 1) * row, values + (H - 1 - y) * row);
+}
+
 /// What stands for linear values: the code of each step of scaled ones, a byte or 16 bits.
 template <class Code> struct ToneCurve {
     const Code *encode;

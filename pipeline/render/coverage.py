@@ -49,13 +49,13 @@ class Coverage:
         """
         if self._target.blank:  # the same everywhere: one sample tells it
             if self._blank is None:
-                depth, samples = self._target.depth(), self._target.read()
                 across, down = self._size
-                one = np.ascontiguousarray(samples[:down, :across])
-                self._blank = kernels.Backdrop(np.ascontiguousarray(depth[:down, :across]), one, DECODED, 1)
+                depth = np.full((down, across), NOTHING, np.float32)
+                one = np.ascontiguousarray(np.broadcast_to(self._target.background_bytes, (down, across, 3)))
+                self._blank = kernels.Backdrop(depth, one, DECODED, 1)
             return self._drawn(chunks, shader, self._blank)
-        samples, depth = np.ascontiguousarray(self._target.read()), self._target.depth()
-        return self._drawn(chunks, shader, self._backdrop(depth, samples, DECODED))
+        backdrop = self._backdrop(self._target.depth(), self._target.read(), DECODED)
+        return self._drawn(chunks, shader, backdrop)
 
     def layers(self, chunks: Chunks, camera: View) -> Layers:
         """The layers of all strands and of what the target shows; the target has been cleared for the camera."""

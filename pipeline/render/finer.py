@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]
 
+_KEPT = 4  # arrays: points, normals, colours and curvature of a head
+
 
 class Finer:
     """Every triangle as four; made once of the triangles (T, 3) of a mesh of `count` points."""
@@ -29,11 +31,21 @@ class Finer:
         parts = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
         self._parts = np.stack([np.stack(part, axis=1) for part in parts], axis=1).astype(np.int32)
         self._points = count + len(first)
+        self._made: list[tuple[_F32, _F32]] = []
+        self._faces: tuple[_F32, _F64, _F64] | None = None
 
     def __call__(self, values: _F32) -> _F32:
-        """Values (V, ...) of the mesh's points and, behind them, the means at the middles of its edges."""
+        """Values (V, ...) of the mesh's points and, behind them, the means at the middles of its edges.
+
+        Of arrays that come again, as those of a stiff head do with every frame, they are kept.
+        """
+        for before, fine in self._made:
+            if before is values:
+                return fine
         begin, end = self._ends.T
-        return np.concatenate([values, np.float32(0.5) * (values[begin] + values[end])])
+        fine = np.concatenate([values, np.float32(0.5) * (values[begin] + values[end])])
+        self._made = [*self._made[-_KEPT + 1 :], (values, fine)]
+        return fine
 
     def facing(self, points: _F32, normals: _F32, eye: _F64) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
         """What an eye (3,) [m] may see of the mesh with points (V, 3) [m] and normals (V, 3) that point outwards.
@@ -42,12 +54,20 @@ class Finer:
         """
         parts = self._parts
         if self.closed:
-            a, b, c = (points[corner].astype(np.float64) for corner in self._corners.T)
-            across = np.cross(b - a, c - a)
-            outward = np.sign((across * normals[self._corners[:, 0]]).sum(axis=1).sum())
-            parts = parts[outward * (across * (eye - a)).sum(axis=1) > 0]
+            if self._faces is None or self._faces[0] is not points:
+                self._faces = (points, *self._planes(points, normals))
+            _, across, offset = self._faces
+            x, y, z = across
+            parts = parts[x * eye[0] + y * eye[1] + z * eye[2] > offset]
         triangles = parts.reshape(-1, 3)
         seen = np.zeros(self._points, bool)
         seen[triangles] = True
         number = np.cumsum(seen, dtype=np.int32) - np.int32(1)
         return np.flatnonzero(seen), number[triangles]
+
+    def _planes(self, points: _F32, normals: _F32) -> tuple[_F64, _F64]:
+        """Outward normals n (3, T) of the triangles, not of unit length, and n.x (T,) of their points x."""
+        a, b, c = (points[corner].astype(np.float64) for corner in self._corners.T)
+        across = np.cross(b - a, c - a)
+        across *= np.sign((across * normals[self._corners[:, 0]]).sum(axis=1).sum())
+        return np.ascontiguousarray(across.T), (across * a).sum(axis=1)

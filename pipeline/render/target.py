@@ -42,8 +42,9 @@ class Target:
         self.width, self.height = width, height
         self._window = _open_window()
         self._renderer = vtkRenderer()
-        self._background = encode(np.array(background))
-        self._renderer.SetBackground(*(self._background / 255.0).tolist())
+        self.background_bytes = encode(np.array(background))
+        """(3,) uint8: what `read` gives where nothing is drawn."""
+        self._renderer.SetBackground(*(self.background_bytes / 255.0).tolist())
         self._window.SetOffScreenRendering(1)
         self._window.SetMultiSamples(0)
         self._window.SetSize(width, height)
@@ -56,6 +57,8 @@ class Target:
         self._actor.GetProperty().LightingOff()
         self._renderer.AddActor(self._actor)
         self._kept: list[Any] = []
+        self._pixels: NDArray[np.uint8] | None = None
+        self._depths: NDArray[np.float32] | None = None
         self.blank = False
         """Whether there is nothing but the background since `background`."""
 
@@ -109,28 +112,37 @@ class Target:
         self._draw(self._mesh(corners.reshape(-1, 3), triangles, own))
 
     def read(self) -> NDArray[np.uint8]:
-        """The bytes of the framebuffer (H, W, 3), top row first."""
-        from vtkmodules.util.numpy_support import vtk_to_numpy
-        from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+        """The bytes of the framebuffer (H, W, 3), top row first; they are valid until the next call."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk
 
+        if self._pixels is None:
+            self._pixels = np.empty((self.height, self.width, 3), np.uint8)
         if self.blank:
-            return np.tile(self._background, (self.height, self.width, 1))
-        pixels = vtkUnsignedCharArray()
-        self._window.GetPixelData(0, 0, self.width - 1, self.height - 1, 0, pixels, 0)
-        return np.asarray(vtk_to_numpy(pixels)).reshape(self.height, self.width, 3)[::-1]
+            self._pixels[:] = self.background_bytes
+            return self._pixels
+        values = numpy_to_vtk(self._pixels.reshape(-1, 3))
+        self._window.GetPixelData(0, 0, self.width - 1, self.height - 1, 0, values, 0)
+        kernels.turn_over(self._pixels)
+        return self._pixels
 
     def depth(self) -> NDArray[np.float32]:
-        """Depth of the framebuffer (H, W), top row first: 0 at the near plane, 1 at the far one, 2 where nothing is."""
-        from vtkmodules.util.numpy_support import vtk_to_numpy
-        from vtkmodules.vtkCommonCore import vtkFloatArray
+        """Depth of the framebuffer (H, W), top row first: 0 at the near plane, 1 at the far one, 2 where nothing is.
 
+        It is valid until the next call.
+        """
+        from vtkmodules.util.numpy_support import numpy_to_vtk
+
+        if self._depths is None:
+            self._depths = np.empty((self.height, self.width), np.float32)
         if self.blank:
-            return np.full((self.height, self.width), NOTHING, np.float32)
-        values = vtkFloatArray()
-        self._window.GetZbufferData(0, 0, self.width - 1, self.height - 1, values)
-        depth = np.array(np.asarray(vtk_to_numpy(values)).reshape(self.height, self.width)[::-1])
-        depth[depth >= 1] = NOTHING
-        return depth
+            self._depths[:] = NOTHING
+            return self._depths
+        self._window.GetZbufferData(
+            0, 0, self.width - 1, self.height - 1, numpy_to_vtk(self._depths.reshape(-1))
+        )
+        kernels.turn_over(self._depths)
+        self._depths[self._depths >= 1] = NOTHING
+        return self._depths
 
     def matrix(self) -> NDArray[np.float64]:
         """World [m] to clip space (4, 4), of the camera of the last `clear`."""

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from pipeline import kernels
 from pipeline.config.schema import Render
 from pipeline.render.target import DECODED, encode
 from pipeline.render.tone import (
@@ -85,3 +87,12 @@ def test_highlights_roll_off_smoothly_and_reversibly() -> None:
     assert np.abs(np.diff(slope)).max() < 2e-3
     assert shown[linear >= WHITE] == pytest.approx(1)
     assert error < 1e-12
+
+
+@pytest.mark.parametrize(
+    "picture", [np.arange(30, dtype=np.uint8).reshape(5, 2, 3), np.eye(4, 3, dtype=np.float32)]
+)
+def test_turning_a_picture_over_reverses_its_rows(picture: NDArray[np.uint8] | NDArray[np.float32]) -> None:
+    turned = picture.copy()
+    kernels.turn_over(turned)
+    assert np.array_equal(turned, picture[::-1])
