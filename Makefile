@@ -117,6 +117,7 @@ performance: env ## all benchmarks, on an idle machine: eight minutes; writes do
 
 gallery: env ## every style, colour and operator, rendered; writes docs/gallery.md, docs/colours.md and docs/operators.md
 	$(BIN)/python docs/gallery.py
+	$(BIN)/python docs/front.py
 	$(BIN)/python docs/colours.py
 	$(BIN)/python docs/operators.py
 

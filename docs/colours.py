@@ -4,10 +4,10 @@ python docs/colours.py renders all of them, `--page` writes the page alone; the 
 """
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final
 
-from panels import DOCS, rendered, side_by_side
+from panels import DOCS, rendered, sheet, side_by_side
 from PIL import Image, ImageDraw
 
 PICTURE = DOCS / "pictures" / "colours.webp"
@@ -89,7 +89,7 @@ amount = 1.0                # where no stop says how much
 def main(wanted: list[str]) -> None:
     """Render all colours, unless only the page is wanted, and write the page."""
     if wanted != ["--page"]:
-        sheet([render(name, values) for name, values in COLOURS.items()])
+        sheet([render(name, values) for name, values in COLOURS.items()], ACROSS, PICTURE, QUALITY)
         render_ombre()
     rows = "\n".join(row(name, values) for name, values in COLOURS.items())
     (DOCS / "colours.md").write_text(_HEAD.format(names=", ".join(COLOURS), rows=rows) + _TAIL)
@@ -112,14 +112,6 @@ def render_ombre() -> None:
     settings = ("simulate.frames=18", f"render.size=[{SIZE * ACROSS // 2}, {SIZE * 3 // 2}]")
     frames = rendered(DOCS.parent / "configs" / "ombre.toml", "colours-ombre", settings, (1, 18))
     side_by_side(frames, DOCS / "pictures" / "ombre.webp", QUALITY)
-
-
-def sheet(panels: Sequence[Image.Image]) -> None:
-    """Write panels as one picture, row by row."""
-    whole = Image.new("RGB", (ACROSS * SIZE, -(-len(panels) // ACROSS) * SIZE))
-    for k, panel in enumerate(panels):
-        whole.paste(panel, (k % ACROSS * SIZE, k // ACROSS * SIZE))
-    whole.save(PICTURE, quality=QUALITY)
 
 
 def row(name: str, values: Mapping[str, object]) -> str:

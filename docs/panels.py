@@ -24,12 +24,15 @@ def rendered(config: Path, experiment: str, settings: Sequence[str], frames: Seq
 
 
 def side_by_side(pictures: Sequence[Path], path: Path, quality: int) -> None:
-    """Write pictures of one height as one WebP file, from left to right."""
-    panels = [Image.open(picture).convert("RGB") for picture in pictures]
-    row = Image.new("RGB", (sum(panel.width for panel in panels), panels[0].height))
-    x = 0
-    for panel in panels:
-        row.paste(panel, (x, 0))
-        x += panel.width
+    """Write pictures of one size as one WebP file, from left to right."""
+    sheet([Image.open(picture).convert("RGB") for picture in pictures], len(pictures), path, quality)
+
+
+def sheet(panels: Sequence[Image.Image], across: int, path: Path, quality: int) -> None:
+    """Write panels of one size as one WebP file, row by row."""
+    width, height = panels[0].size
+    whole = Image.new("RGB", (across * width, -(-len(panels) // across) * height))
+    for k, panel in enumerate(panels):
+        whole.paste(panel, (k % across * width, k // across * height))
     path.parent.mkdir(parents=True, exist_ok=True)
-    row.save(path, quality=quality)
+    whole.save(path, quality=quality)
