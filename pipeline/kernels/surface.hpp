@@ -87,24 +87,39 @@ RINGLET_INLINE Vec3<float> clear_of(const Vec3<float> &normal, const Vec3<float>
     return (1.0f / square_root<float>(dot(up, up) + 1e-12f)) * up;
 }
 
+/// How many strands n lie between light and skin, and how far off [m] the first is, at the k-th of some places that fill a
+/// disc of a radius [m] around x evenly.
+RINGLET_INLINE Reach reach_on_disc(const ShadowMap &map, const Vec3<float> &x, const Vec3<float> axes[2], Floats radius,
+                                   int k, int places) {
+    const float out = std::sqrt((k + 0.5f) / places), turn = 2.39996323f * k; // the golden angle
+    return reach(map, x + (radius * (out * std::cos(turn))) * axes[0] + (radius * (out * std::sin(turn))) * axes[1], 0.0f);
+}
+
 /// Part of the light of map l, in R, G, B, that hair lets past around points `above` the skin, from the middle of the map:
 /// the mean over a disc as wide as light spreads in skin (Jensen et al., A Practical Model for Subsurface Light
-/// Transport, 2001). Shadows of single strands, finer than the mesh they fall on, would be stains at its points. The part
-/// that meets no strand at all comes back: what strands have scattered gives no gloss.
+/// Transport, 2001). Shadows of single strands, finer than the mesh they fall on, would be stains at its points. What
+/// strands have scattered, e^(-loss n) - e^-n, comes from a cone: from hair at a distance d, the mean over a disc of
+/// kCone d. The part that meets no strand at all comes back: what strands have scattered gives no gloss.
 inline Floats past_hair(const Illumination &light, int l, const Vec3<float> &above, const Vec3<float> &normal,
                         const float loss[3], Floats past[3]) {
-    constexpr int places = 8;
-    constexpr float radius = 4e-3f; // [m]
-    const Floats flat = 1.0f - normal.y * normal.y, down = 1.0f / square_root<float>(flat + 1e-6f);
-    const Vec3<float> along{down * normal.z, splat(0.0f), -(down * normal.x)}, across = cross(normal, along);
-    for (int c = 0; c < 3; ++c) past[c] = splat(0.0f);
-    Floats straight = splat(0.0f);
-    for (int k = 0; k < places; ++k) {
-        const float out = radius * std::sqrt((k + 0.5f) / places), turn = 2.39996323f * k; // the golden angle
-        const Vec3<float> at = above + splat(out * std::cos(turn)) * along + splat(out * std::sin(turn)) * across;
-        const Floats n = reach(light.shadows->maps[l], at, 0.0f).n;
-        for (int c = 0; c < 3; ++c) past[c] += (1.0f / places) * exponential(-loss[c] * n);
-        straight += (1.0f / places) * exponential(-n);
+    constexpr float kSpread = 4e-3f, kCone = 0.5f;
+    const ShadowMap &map = light.shadows->maps[l];
+    // Two axes across a unit vector: Duff et al., Building an Orthonormal Basis, Revisited (2017)
+    const Floats sign = normal.z >= 0.0f ? splat(1.0f) : splat(-1.0f), part = -1.0f / (sign + normal.z);
+    const Vec3<float> along{1.0f + sign * normal.x * normal.x * part, sign * normal.x * normal.y * part, -(sign * normal.x)};
+    const Vec3<float> axes[2] = {along, cross(normal, along)};
+    Floats straight = splat(0.0f), way = splat(0.0f), met = splat(0.0f);
+    for (int k = 0; k < 8; ++k) {
+        const Reach hair = reach_on_disc(map, above, axes, splat(kSpread), k, 8);
+        const Floats open = exponential(-hair.n);
+        straight += 0.125f * open, way += 0.125f * (1.0f - open) * hair.way, met += hair.n;
+    }
+    for (int c = 0; c < 3; ++c) past[c] = straight;
+    if (!any<float>(met > 0.0f)) return straight; // here the disc below is the one above, which adds nothing
+    const Floats radius = maximum<float>(kCone * way / (1.001f - straight), splat(kSpread));
+    for (int k = 0; k < 5; ++k) {
+        const Floats n = reach_on_disc(map, above, axes, radius, k, 5).n, open = exponential(-n);
+        for (int c = 0; c < 3; ++c) past[c] += 0.2f * (exponential(-loss[c] * n) - open);
     }
     return straight;
 }

@@ -173,6 +173,34 @@ def test_hair_shadows_the_skin_by_its_loss() -> None:
     assert (np.diff(through, axis=1) < 0).all(), "brown hair takes more blue than red"
 
 
+def band(height: float) -> tuple[_F32, _F32]:
+    """Strands side by side over a strip of 2 cm, as high above y = 0, one on the way of light in the mean."""
+    z = (np.arange(200) + 0.5) * 1e-4 - 0.01
+    x = np.linspace(-0.2, 0.2, 64)
+    points = np.stack(np.broadcast_arrays(x, height + 0.0005 * (z[:, None] * 3e4 % 2), z[:, None]), axis=-1)
+    return points.astype(np.float32), np.full(points.shape[:2], 1e-4, np.float32)
+
+
+def test_light_that_a_lock_scatters_reaches_the_skin_as_little_as_the_lock_is_seen_from_there() -> None:
+    """From a distance of five widths a lock fills a quarter of the cone that its light comes from, from fifty none."""
+    z = np.linspace(-0.004, 0.004, 33)
+    points = np.stack([0 * z, 0 * z, z], axis=-1).astype(np.float32)
+    up = np.tile(np.float32([0, 1, 0]), (len(z), 1))
+    part = {}
+    for height in (0.004, 0.1, 1.0):
+        lighting = lit(SUN, band(height), None, melanin=0.3)
+        seen = [
+            lighting.shade_surface(points, up, albedo * np.ones_like(points), EYE) for albedo in (1.0, 0.0)
+        ]
+        part[height] = (seen[0] - seen[1]).mean(0) / (2.0 / np.pi)
+    near, far = part[0.004] - part[1.0], part[0.1] - part[1.0]
+    print(f"scattered light under the lock {near}, 10 cm below {far}; {part[1.0]} goes straight past")
+    assert (part[1.0] < 0.4).all()
+    assert near[0] > 0.3
+    assert (far > 0.1 * near).all()
+    assert (far < 0.4 * near).all()
+
+
 def test_skin_under_open_sky_shows_its_albedo() -> None:
     shaded = skin(lit(SKY, ONE_HAIR, sphere()), directions(500), 0.4)
     print(f"under the sky {shaded.mean():.3f} of 0.4")
