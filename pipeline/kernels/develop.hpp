@@ -42,8 +42,14 @@ template <class Code> struct ToneCurve {
 template <class Code>
 void develop(const float *linear, Code *codes, size_t count, const ToneCurve<Code> &tone, int threads) {
     const float last = float(tone.steps - 1);
+    constexpr size_t most = 64; // at once: first the steps, side by side
 #pragma omp parallel for schedule(static) num_threads(threads)
-    for (size_t k = 0; k < count; ++k) codes[k] = tone.encode[int(std::max(0.0f, std::min(last, linear[k] * tone.scale)))];
+    for (size_t first = 0; first < count; first += most) {
+        const size_t n = std::min(most, count - first);
+        int step[most];
+        for (size_t k = 0; k < n; ++k) step[k] = int(std::max(0.0f, std::min(last, linear[first + k] * tone.scale)));
+        for (size_t k = 0; k < n; ++k) codes[first + k] = tone.encode[step[k]];
+    }
 }
 
 } // namespace ringlet

@@ -129,15 +129,16 @@ inline void find_solid(ShadowMap &map, const DistanceField *field, const Pose &p
     if (!field) return;
     const Rigid<float> to_rest(pose.inverse());
     const Vec3<float> away = to_rest.turn({splat(map.axis[2][0]), splat(map.axis[2][1]), splat(map.axis[2][2])});
-    Floats lane;
-    for (int k = 0; k < 16; ++k) lane[k] = float(k);
+    // Nodes four by four: their rays take the same ways
+    Ints down, along;
+    for (int k = 0; k < 16; ++k) down[k] = k / 4, along[k] = k % 4;
     const auto world = [&](int k, Floats u, Floats v, Floats w) RINGLET_ALWAYS {
         return map.axis[0][k] * u + map.axis[1][k] * v + map.axis[2][k] * w + float(map.centre[k]);
     };
-#pragma omp parallel for schedule(dynamic, 4) num_threads(threads)
-    for (int i = 0; i < map.n[0]; ++i)
-        for (int first = 0; first < map.n[1]; first += 16) {
-            const Floats u = splat(map.low[0] + i * map.spacing), v = (lane + float(first)) * map.spacing + map.low[1];
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+    for (int top = 0; top < map.n[0]; top += 4)
+        for (int left = 0; left < map.n[1]; left += 4) {
+            const Floats u = real(down + top) * map.spacing + map.low[0], v = real(along + left) * map.spacing + map.low[1];
             const Floats w = splat(map.low[2]);
             const Vec3<float> start = to_rest(Vec3<float>{world(0, u, v, w), world(1, u, v, w), world(2, u, v, w)});
             Floats way, end, phi, hit = splat(ShadowMap::kFar);
@@ -150,7 +151,10 @@ inline void find_solid(ShadowMap &map, const DistanceField *field, const Pose &p
                 open &= (phi >= 1e-4f) & (way < end);
                 way += open ? maximum<float>(phi, splat(2e-4f)) : splat(0.0f);
             }
-            for (int k = 0; k < 16 && first + k < map.n[1]; ++k) map.solid[size_t(i) * map.n[1] + first + k] = hit[k];
+            for (int k = 0; k < 16; ++k) {
+                const int i = top + k / 4, j = left + k % 4;
+                if (i < map.n[0] && j < map.n[1]) map.solid[size_t(i) * map.n[1] + j] = hit[k];
+            }
         }
 }
 

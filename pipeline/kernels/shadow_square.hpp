@@ -52,7 +52,7 @@ class ShadowSquare {
     }
 
   private:
-    static constexpr int K = ShadowMap::kLayers, kSide = 48; // nodes along a square
+    static constexpr int K = ShadowMap::kLayers, kSide = 64; // nodes along a square
     static constexpr int kBefore = 3, kAfter = 2;            // cells around it
     static constexpr int kCells = kSide + kBefore + kAfter, kNodes = kSide + 2;
 

@@ -88,18 +88,24 @@ class Tile {
 
     /// Writes the backdrop into these pixels of a tile without hair.
     void bare(int tile, const TilePixels &wanted, float *picture) const {
-        const int left = view_.left(tile), top = view_.top(tile);
-        for (int y = top; y < std::min(top + kTile, view_.H); ++y)
-            for (int x = left; x < std::min(left + kTile, view_.W); ++x) {
-                if (!wanted.has(x - left, y - top)) continue;
+        const int left = view_.left(tile), top = view_.top(tile), n = back_.n;
+        const int columns = std::min(kTile, view_.W - left), rows = std::min(kTile, view_.H - top);
+        const float share = 1 / float(n * n);
+        for (int y = 0; y < rows; ++y) {
+            const uint32_t own = wanted.rows[y];
+            float *to = picture + 3 * (size_t(top + y) * view_.W + left);
+            const uint8_t *first = back_.samples + 3 * back_.sample(view_, left, top + y, 0, 0);
+            for (int x = 0; x < columns; ++x, to += 3) {
+                if (!(own >> x & 1)) continue;
                 float sum[3] = {};
-                for (int j = 0; j < back_.n; ++j)
-                    for (int i = 0; i < back_.n; ++i) {
-                        const uint8_t *at = back_.samples + 3 * back_.sample(view_, x, y, i, j);
+                for (int j = 0; j < n; ++j)
+                    for (int i = 0; i < n; ++i) {
+                        const uint8_t *at = first + 3 * ((size_t(j) * view_.W + x) * n + i);
                         for (int c = 0; c < 3; ++c) sum[c] += back_.decode[at[c]];
                     }
-                for (int c = 0; c < 3; ++c) picture[3 * (size_t(y) * view_.W + x) + c] = sum[c] / float(back_.n * back_.n);
+                for (int c = 0; c < 3; ++c) to[c] = share * sum[c];
             }
+        }
     }
 
     /// The open pixels that a segment may touch, for `draw`.
