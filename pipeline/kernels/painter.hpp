@@ -51,7 +51,7 @@ class Painter {
 
   private:
     static constexpr int kCount = kSide * kSide, kAhead = 16;
-    static constexpr size_t kPortion = 256; // entries that are shaded together
+    static constexpr size_t kPortion = 128; // entries that are shaded together
     static constexpr size_t kLook = 32;     // entries from one look at which pixels are open to the next
 
     const View &view_;
