@@ -21,7 +21,7 @@ Chunk = tuple[Points, Points, Points, NDArray[np.uint32]]
 Chunks = Callable[[], Iterable[Chunk]]
 
 _PARTS = (np.arange(256) / 255).astype(np.float32)
-_LAYERS = 14.0 # of hair that hide the rest: with fewer, more pixels are drawn twice; with more, more is sorted for nothing
+_LAYERS = 14.0  # of hair that hide the rest: with fewer, more pixels are drawn twice; with more, more is sorted for nothing
 
 
 class Coverage:
