@@ -264,7 +264,7 @@ def hair(reference: Reference) -> dict[str, Any]:
     own = reference.fibre
     return {
         "type": "hair",
-        "sigma_a": colour(pigment.absorption(own.melanin, own.redness)),
+        "sigma_a": colour(pigment.table(own)[0, 0, :3].astype(np.float64)),  # with the dye; no strand differs
         "longitudinal_roughness": own.roughness,
         "azimuthal_roughness": own.azimuthal_roughness,
         "scale_tilt": -float(np.degrees(own.tilt)),
