@@ -154,6 +154,13 @@ RINGLET_INLINE Flux two_flux(const Layer &a, Floats n, Floats behind, Floats thr
             maximum<float>(a.Q * through + a.ratio * first * there + last * rest, splat(0.0f))};
 }
 
+/// How much more of R is seen than of a fibre in the mean, where `crowd` fibres lie along one fibre's radius. Fibres take
+/// room: of cylinders at random a side that lies x radii nearer to the eye than the axis is seen e^(crowd x) as often. R comes
+/// from the side that faces eye and light, x = cos(phi / 2); in the mean a fibre shows x = pi / 4.
+RINGLET_INLINE Floats shown(Floats crowd, Floats azimuths) {
+    return exponential(minimum<float>(crowd, splat(1.0f)) * (square_root<float>(0.5f + 0.5f * azimuths) - kPi / 4));
+}
+
 /// M of the lobes R, TT and TRT + rest, widened by the light's spread.
 RINGLET_INLINE void widened(const FibreTables &tables, Floats rough, Floats spread, Floats cosines, Floats sines, Floats M[3]) {
     for (int p = 0; p < 3; ++p) M[p] = along(cosines, sines, Lobe(rough * tables.variance[p] + spread));
@@ -164,14 +171,17 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
                                                 const FibreTables &tables, const Vec3<float> &normal, Floats radiance[3]) {
     const Vec3<float> L = light.direction(l);
     const ShadowMap &map = light.shadows->maps[l];
-    Reach way = reach(map, p.at, 1.0f);
+    const Reach way = reach(map, p.at, 1.0f);
 
     // Angles of the fibre's frame
     const Floats sine = clamp(dot(p.tangent, L), -1, 1);
     const Floats cosine = square_root<float>(maximum<float>(1.0f - sine * sine, splat(1e-6f)));
     const Floats difference = p.theta - (0.5f * kPi - arc_cosine(sine));
     const Floats azimuths = clamp((dot(p.to_eye, L) - p.sine * sine) / (p.cosine * cosine), -1, 1), phi = arc_cosine(azimuths);
-    way.n *= 1.0f - shared(way.way * cosine, square_root<float>(2.0f - 2.0f * azimuths), map.width);
+    // Strands that would hide what is seen from the light itself are not there; what they scatter comes from beside them
+    const Floats together = shared(way.way * cosine, square_root<float>(2.0f - 2.0f * azimuths), map.width);
+    const Floats before = way.n * (1.0f - together);
+    const Floats crowns = shown(0.5f * map.width * way.crowded / cosine, azimuths);
     const Place theta = inclination(tables, tables.reciprocal ? 0.5f * difference : p.theta);
     const Place azimuth(phi * ((tables.H - 1) / kPi), tables.H);
 
@@ -191,13 +201,13 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
 
     const Floats through = exponential(-way.n), past = exponential(-way.behind);
     const Words glint = mix(p.patch + 0x9e3779b9u * uint32_t(l + 1));
-    const Floats seen = light.glints ? (uniform(glint) < through ? splat(1.0f) : splat(0.0f)) : through;
+    const Floats alone = exponential(-before), seen = light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f)) : alone;
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
     for (int c = 0; c < 3; ++c) {
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
         const Flux flux = two_flux(p.layers[c], way.n, way.behind, through, past);
         const Floats scattered = flux.down, returned = flux.up * facing;
-        Floats sum = seen * (direct[0] * lobes[0] + direct[1] * lobes[1] + direct[2] * lobes[2] + direct[3] * lobes[3]);
+        Floats sum = seen * (crowns * direct[0] * lobes[0] + direct[1] * lobes[1] + direct[2] * lobes[2] + direct[3] * lobes[3]);
         // G(pi - phi) = 2 mean - G(phi): the half circles complete each other
         const Floats *twice = p.layers[c].twice;
         for (int q = 0; q < 3; ++q) sum += scattered * down[q] * lobes[4 + q] + returned * back[q] * (twice[q] - lobes[4 + q]);
