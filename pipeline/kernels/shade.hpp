@@ -2,7 +2,7 @@
 //
 // With n fibres on the way to the light (the mean of a Poisson count) and n_b behind the point, per channel,
 //
-//     L = E V { e^-n sum M N + D sum M(v + v_D) G(phi) + c U sum M(v + v_U) G(pi - phi) } + environment,
+//     L = E V { e^-n sum M N + D sum M(v + v_D) G(phi) + c U sum M(v + v_U) G(pi - phi) } + S (a_f + a_b) (r + (1 - r) T),
 //
 // where D and U are the fluence of scattered light that goes down and that comes back up in a layer of fibres. Of direct light
 // a_f is scattered on and a_b back; of scattered light, which comes from all sides, s back and a_f + a_b - s = 1 - g on. It
@@ -11,9 +11,15 @@
 //     D' = m (-g D + s U + a_f e^-n),  -U' = m (-g U + s D + a_b e^-n),  D(0) = 0,  U(n + n_b) = 0.
 //
 // m k, k^2 = g^2 - s^2, is the rate at which light fades deep in the layer; pipeline/render/fibre.py finds it without two
-// streams. `test_scattered_light_is_that_of_a_layer_of_fibres` holds D and U against random walks. Ours; a variant of Zinke et al., Dual Scattering Approximation for Fast Multiple Scattering in Hair, SIGGRAPH
-// 2008, which counts hits along the ray and truncates the layer's series. Kubelka and Munk (1931) for the two streams, with
-// a collimated source. c = max(0.2, N.L).
+// streams. `test_scattered_light_is_that_of_a_layer_of_fibres` holds D and U against random walks. c = max(0.2, N.L).
+//
+// Of a sky S, T is what comes through hair and head (sky.hpp) and r = s / (g + k) what infinitely deep hair returns: a layer
+// of n fibres that is lit from both sides shines as bright as (e + r) / (1 + r e) of the sky, e = e^-kn, nearly r + (1 - r) e.
+// The head counts as such hair.
+//
+// Ours; a variant of Zinke et al., Dual Scattering Approximation for Fast Multiple Scattering in Hair, SIGGRAPH 2008, which
+// counts hits along the ray and truncates the layer's series. Kubelka and Munk (1931) for the two streams, with a collimated
+// source.
 #pragma once
 
 #include "illumination.hpp"
@@ -67,10 +73,13 @@ struct FibrePoints {
     Floats albedo[3];               // a_f + a_b
     Layer layers[3];
     Floats passed, forward, back;   // green's a_f; variance that each fibre adds to light it passes, and of light from behind
-    Words patch;                    // hash of 4 mm of its strand
+    Words patch;                    // of 4 mm of its strand: from hash to hash evenly spread
 };
 
 constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
+// Nodes of a shadow map. Of the strands whose shadows a node sums up the eye sees the foremost: they lie before its mean.
+// `test_points_that_are_seen_are_lit_as_exact_rays_say`
+constexpr float kBefore = 0.25f;
 
 /// An inclination's place in the tables.
 RINGLET_INLINE Place inclination(const FibreTables &tables, Floats theta) {
@@ -118,7 +127,8 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
         const uint32_t key = mix(points[i].key);
         // The first segment is held, so its length is the same in every frame and patches do not crawl
         const float patches = std::min(j * std::sqrt(spacing) / kPatch + float(key >> 8) * 0x1p-24f, 1e6f);
-        patch[i] = mix(key ^ mix(uint32_t(patches)));
+        // Steps of the golden ratio: of a strand's next patches a part e^-n is lit, more evenly than by chance
+        patch[i] = key + 0x9e3779b9u * uint32_t(patches);
     }
     FibrePoints p;
     Vec3<float> x;
@@ -128,9 +138,9 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     const auto unit = [](Vec3<float> a) { return (1.0f / square_root<float>(dot(a, a) + 1e-30f)) * a; };
     p.tangent = unit(p.tangent);
     p.to_eye = unit({float(eye[0]) - x.x, float(eye[1]) - x.y, float(eye[2]) - x.z});
-    p.at = from_centre(light, x);
-    // Hair that is seen lies on the eye's side of its voxel, which is thicker than the layer that covers it
-    p.x = in_voxels(light, x) + splat(0.5f) * p.to_eye;
+    p.at = from_centre(light, x) + splat(light.lights ? kBefore * light.shadows->maps[0].spacing : 0.0f) * p.to_eye;
+    // So they do in the sky's voxels, which are twice as large and smoothed: by one of them
+    p.x = in_voxels(light, x) + splat(2.0f) * p.to_eye;
     p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
     p.cosine = square_root<float>(maximum<float>(1.0f - p.sine * p.sine, splat(1e-6f)));
     p.theta = 0.5f * kPi - arc_cosine(p.sine);
@@ -200,7 +210,7 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     }
 
     const Floats through = exponential(-way.n), past = exponential(-way.behind);
-    const Words glint = mix(p.patch + 0x9e3779b9u * uint32_t(l + 1));
+    const Words glint = p.patch + mix(uint32_t(l + 1));
     const Floats alone = exponential(-before), seen = light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f)) : alone;
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
     for (int c = 0; c < 3; ++c) {
@@ -218,10 +228,10 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
 /// Light of 16 points from everywhere.
 inline void light_block(FibrePoints &p, const Illumination &light, const FibreTables &tables, Floats radiance[3]) {
     Floats around[8];
-    read_surroundings(light, p.x, around);
+    read_sky<Eight>(light, light.surroundings, p.x, around);
     const Vec3<float> out{around[4], around[5], around[6]};
     const Vec3<float> normal = (1.0f / square_root<float>(dot(out, out) + 1e-20f)) * out;
-    for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * p.albedo[c] * around[c];
+    for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * p.albedo[c] * (p.layers[c].ratio + (1.0f - p.layers[c].ratio) * around[c]);
     for (int l = 0; l < light.lights; ++l) add_light(p, light, l, tables, normal, radiance);
 }
 
