@@ -139,8 +139,9 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     p.tangent = unit(p.tangent);
     p.to_eye = unit({float(eye[0]) - x.x, float(eye[1]) - x.y, float(eye[2]) - x.z});
     p.at = from_centre(light, x) + splat(light.lights ? kBefore * light.shadows->maps[0].spacing : 0.0f) * p.to_eye;
-    // So they do in the sky's voxels, which are twice as large and smoothed: by one of them
-    p.x = in_voxels(light, x) + splat(2.0f) * p.to_eye;
+    // Of the sky, whose voxels are twice as large, its own hair hides nothing: it lies before all of it, half a voxel and the
+    // next one, over which its voxel's hair is spread
+    p.x = in_voxels(light, x) + splat(3.0f) * p.to_eye;
     p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
     p.cosine = square_root<float>(maximum<float>(1.0f - p.sine * p.sine, splat(1e-6f)));
     p.theta = 0.5f * kPi - arc_cosine(p.sine);
@@ -164,12 +165,11 @@ RINGLET_INLINE Flux two_flux(const Layer &a, Floats n, Floats behind, Floats thr
             maximum<float>(a.Q * through + a.ratio * first * there + last * rest, splat(0.0f))};
 }
 
-/// How much more of R is seen than of a fibre in the mean, where `crowd` fibres lie along one fibre's radius. Fibres take
+/// How much more of a lobe is seen than of a fibre in the mean, where `crowd` fibres lie along one fibre's radius. Fibres take
 /// room: of cylinders at random a side that lies x radii nearer to the eye than the axis is seen e^(crowd x) as often. R comes
-/// from the side that faces eye and light, x = cos(phi / 2); in the mean a fibre shows x = pi / 4.
-RINGLET_INLINE Floats shown(Floats crowd, Floats azimuths) {
-    return exponential(minimum<float>(crowd, splat(1.0f)) * (square_root<float>(0.5f + 0.5f * azimuths) - kPi / 4));
-}
+/// from the side that faces eye and light, x = cos(phi / 2); TRT, of hair that is not black, from x = 2 / 3 in the mean, at any
+/// phi (0.69 of white hair, 0.66 of brown); all of a fibre from x = pi / 4.
+RINGLET_INLINE Floats shown(Floats crowd, Floats x) { return exponential(crowd * (x - kPi / 4)); }
 
 /// M of the lobes R, TT and TRT + rest, widened by the light's spread.
 RINGLET_INLINE void widened(const FibreTables &tables, Floats rough, Floats spread, Floats cosines, Floats sines, Floats M[3]) {
@@ -191,7 +191,8 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     // Strands that would hide what is seen from the light itself are not there; what they scatter comes from beside them
     const Floats together = shared(way.way * cosine, square_root<float>(2.0f - 2.0f * azimuths), map.width);
     const Floats before = way.n * (1.0f - together);
-    const Floats crowns = shown(0.5f * map.width * way.crowded / cosine, azimuths);
+    const Floats crowd = minimum<float>(0.5f * map.width * way.crowded / cosine, splat(1.0f));
+    const Floats crowns = shown(crowd, square_root<float>(0.5f + 0.5f * azimuths)), flanks = shown(crowd, splat(2.0f / 3));
     const Place theta = inclination(tables, tables.reciprocal ? 0.5f * difference : p.theta);
     const Place azimuth(phi * ((tables.H - 1) / kPi), tables.H);
 
@@ -217,7 +218,7 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
         const Flux flux = two_flux(p.layers[c], way.n, way.behind, through, past);
         const Floats scattered = flux.down, returned = flux.up * facing;
-        Floats sum = seen * (crowns * direct[0] * lobes[0] + direct[1] * lobes[1] + direct[2] * lobes[2] + direct[3] * lobes[3]);
+        Floats sum = seen * (crowns * direct[0] * lobes[0] + direct[1] * lobes[1] + flanks * direct[2] * lobes[2] + direct[3] * lobes[3]);
         // G(pi - phi) = 2 mean - G(phi): the half circles complete each other
         const Floats *twice = p.layers[c].twice;
         for (int q = 0; q < 3; ++q) sum += scattered * down[q] * lobes[4 + q] + returned * back[q] * (twice[q] - lobes[4 + q]);

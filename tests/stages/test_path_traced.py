@@ -14,7 +14,8 @@ PICTURES = Path(__file__).parents[2].parent / "shared/reference/pictures"
     ("name", "colour", "correlation"),
     [
         ("s1_brown", 0.07, 0.97),
-        ("s1_black", 0.08, 0.97),
+        ("s1_black", 0.07, 0.97),
+        ("s2_brown", 0.07, 0.97),
         ("s3_brown", 0.07, 0.97),
         ("s4_brown", 0.09, 0.86),  # few curls: of 17 px so few patches are lit that their chance shows
     ],
