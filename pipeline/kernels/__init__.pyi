@@ -653,7 +653,9 @@ def body_density(
 
     """
 
-def surroundings(hair: _F32, body: _F32 | None, spacing: float, loss: _F32, directions: _F32) -> _F32:
+def surroundings(
+    hair: _F32, body: _F32 | None, spacing: float, loss: _F32, directions: _F32, weights: _F32
+) -> tuple[_F32, _F32]:
     """What a point sees of the sky, and which way is out of the hair, on a grid of half the resolution.
 
     Args:
@@ -662,9 +664,11 @@ def surroundings(hair: _F32, body: _F32 | None, spacing: float, loss: _F32, dire
         spacing: [m].
         loss: (3,) float32, part of the light that one fibre takes away, for R, G, B.
         directions: (D, 3) float32, evenly spread unit vectors.
+        weights: (D, 3) float32, what hair answers to light from there, for R, G, B: of mean 1.
 
     Returns:
-        (nx/2, ny/2, nz/2, 8) float32: mean transmittance R, G, B, 0, outward normal x, y, z (not normalised), 0.
+        (nx/2, ny/2, nz/2, 8) float32: weighted mean transmittance R, G, B, 0, outward normal x, y, z (not normalised), 0;
+        (nx/2, ny/2, nz/2, 4) float32: mean transmittance R, G, B, 0.
 
     """
 
@@ -756,6 +760,7 @@ class Illumination:
         sky: _F32,
         shadows: Shadows,
         surroundings: _F32,
+        everywhere: _F32,
     ) -> None:
         """Lights with their shadows; all is held and not copied.
 
@@ -764,7 +769,8 @@ class Illumination:
             irradiance: (L, 3) float32 [W/m^2], R, G, B on a surface that faces the light.
             sky: (3,) float32, radiance of the constant sky.
             shadows: finished, of the same directions.
-            surroundings: (nx/2, ny/2, nz/2, 8) float32, see `surroundings`.
+            surroundings: (nx/2, ny/2, nz/2, 8) float32, what hair sees of the sky: see `surroundings`.
+            everywhere: (nx/2, ny/2, nz/2, 4) float32, what the head does.
 
         """
 

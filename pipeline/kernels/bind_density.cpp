@@ -98,7 +98,20 @@ static nb::ndarray<nb::numpy, float> body(const DistanceField &field, Array<cons
     return values;
 }
 
-static nb::ndarray<nb::numpy, float> surroundings(Volume hair, std::optional<Volume> body, double spacing, Floats1 loss, Vectors directions) {
+static void check_weights(const Vectors &weights) {
+    for (int c = 0; c < 3; ++c) {
+        double sum = 0;
+        for (size_t i = 0; i < weights.shape(0); ++i) {
+            const float weight = weights.data()[3 * i + c];
+            require(weight >= 0, "surroundings: expected weights of 0 or more");
+            sum += weight;
+        }
+        require(std::abs(sum - double(weights.shape(0))) < 1e-4 * double(weights.shape(0)), "surroundings: expected weights of mean 1");
+    }
+}
+
+static nb::tuple surroundings(Volume hair, std::optional<Volume> body, double spacing, Floats1 loss, Vectors directions,
+                              Array<const float, -1, 3> weights) {
     int n[3];
     for (int axis = 0; axis < 3; ++axis) {
         require(!body || hair.shape(axis) == body->shape(axis), "surroundings: hair and body differ in shape");
@@ -107,14 +120,19 @@ static nb::ndarray<nb::numpy, float> surroundings(Volume hair, std::optional<Vol
     }
     require(spacing > 0, "surroundings: expected a positive spacing");
     check_directions(directions, "surroundings: expected unit directions");
+    require(weights.shape(0) == directions.shape(0), "surroundings: weights do not fit directions");
+    check_weights(weights);
     auto records = new_array<float>({size_t(n[0] / 2), size_t(n[1] / 2), size_t(n[2] / 2), size_t(8)});
-    float *out = records.data();
+    auto open = new_array<float>({size_t(n[0] / 2), size_t(n[1] / 2), size_t(n[2] / 2), size_t(4)});
+    float *out = records.data(), *plain = open.data();
+    {
     nb::gil_scoped_release release;
     Sky sky{halve(hair.data(), n, threads()), body ? halve(body->data(), n, threads()) : std::vector<float>(),
-            {n[0] / 2, n[1] / 2, n[2] / 2}, 2 * spacing, loss.data(), directions.data(), int(directions.shape(0))};
-    write_transmittance(sky, out, threads());
+            {n[0] / 2, n[1] / 2, n[2] / 2}, 2 * spacing, loss.data(), directions.data(), weights.data(), int(directions.shape(0))};
+    write_transmittance(sky, out, plain, threads());
     add_normals(sky, out, threads());
-    return records;
+    }
+    return nb::make_tuple(records, open);
 }
 
 void bind_density(nb::module_ &m) {
@@ -128,7 +146,7 @@ void bind_density(nb::module_ &m) {
     m.def("optical_depth", &optical_depth, nb::arg("density"), nb::arg("spacing"), nb::arg("directions"));
     m.def("body_density", &body, nb::arg("field"), nb::arg("pose"), nb::arg("shape"), nb::arg("origin"), nb::arg("spacing"));
     m.def("surroundings", &surroundings, nb::arg("hair"), nb::arg("body").none(), nb::arg("spacing"), nb::arg("loss"),
-          nb::arg("directions"));
+          nb::arg("directions"), nb::arg("weights"));
 }
 
 } // namespace ringlet

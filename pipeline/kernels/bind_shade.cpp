@@ -51,11 +51,12 @@ struct HeldLight : Illumination {
     Triples direction_array, irradiance_array;
     Triple sky_array;
     Records surrounding_array;
+    Array<const float, -1, -1, -1, 4> open_array;
     std::shared_ptr<Shadows> held_shadows;
 };
 
 static void make_light(HeldLight *held, Triples directions, Triples irradiance, Triple sky, std::shared_ptr<Shadows> shadows,
-                       Records surroundings) {
+                       Records surroundings, Array<const float, -1, -1, -1, 4> open) {
     Illumination light{};
     light.lights = int(directions.shape(0));
     require(irradiance.shape(0) == directions.shape(0), "Illumination: irradiance does not fit directions");
@@ -64,10 +65,11 @@ static void make_light(HeldLight *held, Triples directions, Triples irradiance, 
     for (int axis = 0; axis < 3; ++axis) {
         light.n[axis] = 2 * int(surroundings.shape(axis));
         require(light.n[axis] >= 4, "Illumination: expected 2 or more surroundings along each axis");
+        require(open.shape(axis) == surroundings.shape(axis), "Illumination: open does not fit surroundings");
     }
     light.directions = directions.data(), light.irradiance = irradiance.data(), light.sky = sky.data();
-    light.surroundings = surroundings.data(), light.shadows = shadows.get();
-    new (held) HeldLight{light, directions, irradiance, sky, surroundings, shadows};
+    light.surroundings = surroundings.data(), light.open = open.data(), light.shadows = shadows.get();
+    new (held) HeldLight{light, directions, irradiance, sky, surroundings, open, shadows};
 }
 
 static Radiance shade_strands(Strands points, Triples variation, Array<const uint32_t, -1> key, Point eye,
@@ -120,7 +122,7 @@ void bind_shade(nb::module_ &m) {
         .def_rw("reciprocal", &HeldTables::reciprocal);
     nb::class_<HeldLight>(m, "Illumination")
         .def("__init__", &make_light, nb::arg("directions"), nb::arg("irradiance"), nb::arg("sky"), nb::arg("shadows"),
-             nb::arg("surroundings"))
+             nb::arg("surroundings"), nb::arg("everywhere"))
         .def_rw("origin", &HeldLight::origin)
         .def_rw("spacing", &HeldLight::spacing)
         .def_rw("glints", &HeldLight::glints);

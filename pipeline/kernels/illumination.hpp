@@ -13,7 +13,8 @@ struct Illumination {
     const float *directions;             // (L, 3) unit vectors towards the lights
     const float *irradiance;             // (L, 3) R, G, B on a surface that faces the light
     const float *sky;                    // (3,) radiance
-    const float *surroundings;           // (nx/2, ny/2, nz/2, 8): transmittance R, G, B, 0, outward normal, 0
+    const float *surroundings;           // (nx/2, ny/2, nz/2, 8): transmittance R, G, B to hair, 0, outward normal, 0
+    const float *open;                   // (nx/2, ny/2, nz/2, 4): transmittance R, G, B, 0
     int n[3]; // voxels of the density grid
     const Shadows *shadows; // a map for each light
     std::array<double, 3> origin{0, 0, 0}; // outer corner of the first voxel [m]
@@ -40,12 +41,14 @@ RINGLET_INLINE Vec3<float> from_centre(const Illumination &light, Vec3<float> x)
     return {x.x - float(c[0]), x.y - float(c[1]), x.z - float(c[2])};
 }
 
-/// Entries of `surroundings`: on voxels twice as large.
-RINGLET_INLINE void read_surroundings(const Illumination &light, Vec3<float> g, Floats entries[8]) {
+/// Entries of `surroundings` (Eight) or `open` (Four): on voxels twice as large.
+template <class Record>
+RINGLET_INLINE void read_sky(const Illumination &light, const float *table, Vec3<float> g, Floats *entries) {
+    constexpr size_t size = sizeof(Record) / 4;
     const int n[3] = {light.n[0] / 2, light.n[1] / 2, light.n[2] / 2};
     const Place x(0.5f * g.x - 0.25f, n[0]), y(0.5f * g.y - 0.25f, n[1]), z(0.5f * g.z - 0.25f, n[2]);
-    const size_t row = 8 * size_t(n[2]), stride[3] = {row * n[1], row, 8};
-    read<Eight>(light.surroundings, x, y, z, stride, entries);
+    const size_t row = size * n[2], stride[3] = {row * n[1], row, size};
+    read<Record>(table, x, y, z, stride, entries);
 }
 
 } // namespace ringlet

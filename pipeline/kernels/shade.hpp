@@ -2,7 +2,7 @@
 //
 // With n fibres on the way to the light (the mean of a Poisson count) and n_b behind the point, per channel,
 //
-//     L = E V { e^-n sum M N + D sum M(v + v_D) G(phi) + c U sum M(v + v_U) G(pi - phi) } + environment,
+//     L = E V { e^-n sum M N + D sum M(v + v_D) G(phi) + c U sum M(v + v_U) G(pi - phi) } + S (a_f + a_b) (r + (1 - r) T),
 //
 // where D and U are the fluence of scattered light that goes down and that comes back up in a layer of fibres. Of direct light
 // a_f is scattered on and a_b back; of scattered light, which comes from all sides, s back and a_f + a_b - s = 1 - g on. It
@@ -11,9 +11,15 @@
 //     D' = m (-g D + s U + a_f e^-n),  -U' = m (-g U + s D + a_b e^-n),  D(0) = 0,  U(n + n_b) = 0.
 //
 // m k, k^2 = g^2 - s^2, is the rate at which light fades deep in the layer; pipeline/render/fibre.py finds it without two
-// streams. `test_scattered_light_is_that_of_a_layer_of_fibres` holds D and U against random walks. Ours; a variant of Zinke et al., Dual Scattering Approximation for Fast Multiple Scattering in Hair, SIGGRAPH
-// 2008, which counts hits along the ray and truncates the layer's series. Kubelka and Munk (1931) for the two streams, with
-// a collimated source. c = max(0.2, N.L).
+// streams. `test_scattered_light_is_that_of_a_layer_of_fibres` holds D and U against random walks. c = max(0.2, N.L).
+//
+// Of a sky S, T is what comes through hair and head (sky.hpp) and r = s / (g + k) what infinitely deep hair returns: a layer
+// of n fibres that is lit from both sides shines as bright as (e + r) / (1 + r e) of the sky, e = e^-kn, nearly r + (1 - r) e.
+// The head counts as such hair.
+//
+// Ours; a variant of Zinke et al., Dual Scattering Approximation for Fast Multiple Scattering in Hair, SIGGRAPH 2008, which
+// counts hits along the ray and truncates the layer's series. Kubelka and Munk (1931) for the two streams, with a collimated
+// source.
 #pragma once
 
 #include "illumination.hpp"
@@ -67,10 +73,13 @@ struct FibrePoints {
     Floats albedo[3];               // a_f + a_b
     Layer layers[3];
     Floats passed, forward, back;   // green's a_f; variance that each fibre adds to light it passes, and of light from behind
-    Words patch;                    // hash of 4 mm of its strand
+    Words patch;                    // of 4 mm of its strand: from hash to hash evenly spread
 };
 
 constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
+// Nodes of a shadow map. Of the strands whose shadows a node sums up the eye sees the foremost: they lie before its mean.
+// `test_points_that_are_seen_are_lit_as_exact_rays_say`
+constexpr float kBefore = 0.25f;
 
 /// An inclination's place in the tables.
 RINGLET_INLINE Place inclination(const FibreTables &tables, Floats theta) {
@@ -118,7 +127,8 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
         const uint32_t key = mix(points[i].key);
         // The first segment is held, so its length is the same in every frame and patches do not crawl
         const float patches = std::min(j * std::sqrt(spacing) / kPatch + float(key >> 8) * 0x1p-24f, 1e6f);
-        patch[i] = mix(key ^ mix(uint32_t(patches)));
+        // Steps of the golden ratio: of a strand's next patches a part e^-n is lit, more evenly than by chance
+        patch[i] = key + 0x9e3779b9u * uint32_t(patches);
     }
     FibrePoints p;
     Vec3<float> x;
@@ -128,9 +138,10 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     const auto unit = [](Vec3<float> a) { return (1.0f / square_root<float>(dot(a, a) + 1e-30f)) * a; };
     p.tangent = unit(p.tangent);
     p.to_eye = unit({float(eye[0]) - x.x, float(eye[1]) - x.y, float(eye[2]) - x.z});
-    p.at = from_centre(light, x);
-    // Hair that is seen lies on the eye's side of its voxel, which is thicker than the layer that covers it
-    p.x = in_voxels(light, x) + splat(0.5f) * p.to_eye;
+    p.at = from_centre(light, x) + splat(light.lights ? kBefore * light.shadows->maps[0].spacing : 0.0f) * p.to_eye;
+    // Of the sky, whose voxels are twice as large, its own hair hides nothing: it lies before all of it, half a voxel and the
+    // next one, over which its voxel's hair is spread
+    p.x = in_voxels(light, x) + splat(3.0f) * p.to_eye;
     p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
     p.cosine = square_root<float>(maximum<float>(1.0f - p.sine * p.sine, splat(1e-6f)));
     p.theta = 0.5f * kPi - arc_cosine(p.sine);
@@ -154,6 +165,12 @@ RINGLET_INLINE Flux two_flux(const Layer &a, Floats n, Floats behind, Floats thr
             maximum<float>(a.Q * through + a.ratio * first * there + last * rest, splat(0.0f))};
 }
 
+/// How much more of a lobe is seen than of a fibre in the mean, where `crowd` fibres lie along one fibre's radius. Fibres take
+/// room: of cylinders at random a side that lies x radii nearer to the eye than the axis is seen e^(crowd x) as often. R comes
+/// from the side that faces eye and light, x = cos(phi / 2); TRT, of hair that is not black, from x = 2 / 3 in the mean, at any
+/// phi (0.69 of white hair, 0.66 of brown); all of a fibre from x = pi / 4.
+RINGLET_INLINE Floats shown(Floats crowd, Floats x) { return exponential(crowd * (x - kPi / 4)); }
+
 /// M of the lobes R, TT and TRT + rest, widened by the light's spread.
 RINGLET_INLINE void widened(const FibreTables &tables, Floats rough, Floats spread, Floats cosines, Floats sines, Floats M[3]) {
     for (int p = 0; p < 3; ++p) M[p] = along(cosines, sines, Lobe(rough * tables.variance[p] + spread));
@@ -164,14 +181,18 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
                                                 const FibreTables &tables, const Vec3<float> &normal, Floats radiance[3]) {
     const Vec3<float> L = light.direction(l);
     const ShadowMap &map = light.shadows->maps[l];
-    Reach way = reach(map, p.at, 1.0f);
+    const Reach way = reach(map, p.at, 1.0f);
 
     // Angles of the fibre's frame
     const Floats sine = clamp(dot(p.tangent, L), -1, 1);
     const Floats cosine = square_root<float>(maximum<float>(1.0f - sine * sine, splat(1e-6f)));
     const Floats difference = p.theta - (0.5f * kPi - arc_cosine(sine));
     const Floats azimuths = clamp((dot(p.to_eye, L) - p.sine * sine) / (p.cosine * cosine), -1, 1), phi = arc_cosine(azimuths);
-    way.n *= 1.0f - shared(way.way * cosine, square_root<float>(2.0f - 2.0f * azimuths), map.width);
+    // Strands that would hide what is seen from the light itself are not there; what they scatter comes from beside them
+    const Floats together = shared(way.way * cosine, square_root<float>(2.0f - 2.0f * azimuths), map.width);
+    const Floats before = way.n * (1.0f - together);
+    const Floats crowd = minimum<float>(0.5f * map.width * way.crowded / cosine, splat(1.0f));
+    const Floats crowns = shown(crowd, square_root<float>(0.5f + 0.5f * azimuths)), flanks = shown(crowd, splat(2.0f / 3));
     const Place theta = inclination(tables, tables.reciprocal ? 0.5f * difference : p.theta);
     const Place azimuth(phi * ((tables.H - 1) / kPi), tables.H);
 
@@ -190,14 +211,14 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     }
 
     const Floats through = exponential(-way.n), past = exponential(-way.behind);
-    const Words glint = mix(p.patch + 0x9e3779b9u * uint32_t(l + 1));
-    const Floats seen = light.glints ? (uniform(glint) < through ? splat(1.0f) : splat(0.0f)) : through;
+    const Words glint = p.patch + mix(uint32_t(l + 1));
+    const Floats alone = exponential(-before), seen = light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f)) : alone;
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
     for (int c = 0; c < 3; ++c) {
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
         const Flux flux = two_flux(p.layers[c], way.n, way.behind, through, past);
         const Floats scattered = flux.down, returned = flux.up * facing;
-        Floats sum = seen * (direct[0] * lobes[0] + direct[1] * lobes[1] + direct[2] * lobes[2] + direct[3] * lobes[3]);
+        Floats sum = seen * (crowns * direct[0] * lobes[0] + direct[1] * lobes[1] + flanks * direct[2] * lobes[2] + direct[3] * lobes[3]);
         // G(pi - phi) = 2 mean - G(phi): the half circles complete each other
         const Floats *twice = p.layers[c].twice;
         for (int q = 0; q < 3; ++q) sum += scattered * down[q] * lobes[4 + q] + returned * back[q] * (twice[q] - lobes[4 + q]);
@@ -208,10 +229,10 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
 /// Light of 16 points from everywhere.
 inline void light_block(FibrePoints &p, const Illumination &light, const FibreTables &tables, Floats radiance[3]) {
     Floats around[8];
-    read_surroundings(light, p.x, around);
+    read_sky<Eight>(light, light.surroundings, p.x, around);
     const Vec3<float> out{around[4], around[5], around[6]};
     const Vec3<float> normal = (1.0f / square_root<float>(dot(out, out) + 1e-20f)) * out;
-    for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * p.albedo[c] * around[c];
+    for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * p.albedo[c] * (p.layers[c].ratio + (1.0f - p.layers[c].ratio) * around[c]);
     for (int l = 0; l < light.lights; ++l) add_light(p, light, l, tables, normal, radiance);
 }
 

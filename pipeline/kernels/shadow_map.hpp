@@ -92,7 +92,8 @@ RINGLET_INLINE Vec3<float> on_map(const ShadowMap &map, Vec3<float> x) {
 /// Strands on the way to a light and behind a point, and how much the head lets through.
 struct Reach {
     Floats n, behind, visible;
-    Floats way; // [m] from the front
+    Floats way;     // [m] from the front
+    Floats crowded; // [1/m] strands on the way through the hair just behind
 };
 
 /// At 16 points, from the map's centre on. `own`: how much of the strands there are the points' own strands.
@@ -123,15 +124,19 @@ RINGLET_INLINE Reach reach(const ShadowMap &map, Vec3<float> x, float own) {
     const Floats c = minimum<float>(real(bits - 0x3f800000) * (ShadowMap::kOctave / 8388608.0f), splat(ShadowMap::kLayers - 1.001f));
     const Ints below = whole(c);
     const Floats part = c - real(below);
-    Floats n = splat(0.0f);
+    Floats n = splat(0.0f), deeper = splat(0.0f);
+    const Ints further = below + 2 * ShadowMap::kOctave, later = further < ShadowMap::kLayers - 2 ? further : Ints{} + (ShadowMap::kLayers - 2);
     for (int k = 0; k < 4; ++k) {
         Floats here, next;
         map.layers.read_pairs((at + offset[k]) * ShadowMap::kLayers + below, here, next);
         n += weight[k] * (here + part * (next - here));
+        map.layers.read_pairs((at + offset[k]) * ShadowMap::kLayers + later, here, next);
+        deeper += weight[k] * (here + part * (next - here));
     }
     const Floats none = splat(0.0f), others = maximum<float>(n - own * map.own, none);
     const Floats behind = maximum<float>(total - n - own * map.own, none);
-    return {inside ? others : none, inside ? behind : none, inside ? lit : splat(1.0f), way};
+    return {inside ? others : none, inside ? behind : none, inside ? lit : splat(1.0f), way,
+            inside ? maximum<float>(deeper - n - own * map.own, none) / (3.0f * (way + map.unit)) : none};
 }
 
 /// Part of the strands before a point that hide it from the eye and the light alike, so that of a point that is seen they

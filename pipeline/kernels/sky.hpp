@@ -48,45 +48,51 @@ struct Sky {
     double spacing;                // [m]
     const float *loss;             // (3,)
     const float *directions;       // (D, 3)
+    const float *weights;          // (D, 3) R, G, B: what hair answers to light from there; of mean 1 in each channel
     int count;                     // D
 };
 
-/// Sums of the light of all directions in R, G and B, in both kinds of rows; integers, so that no order of directions
-/// changes them.
+/// Sums of the light of all directions in R, G and B, weighted and as it is, in both kinds of rows; integers, so that no
+/// order of directions changes them.
 struct SkySums {
     static constexpr float kWhole = 1 << 30; // of all directions
+    static constexpr int kSums = 6;
 
-    std::vector<uint32_t> rows[2][3];
+    std::vector<uint32_t> rows[2][kSums];
 
     explicit SkySums(const int n[3]) {
         for (int across_z = 0; across_z < 2; ++across_z)
             for (auto &channel : rows[across_z]) channel.resize(Rows(n, across_z).size());
     }
 
-    /// Adds e^(-k n - body), k for R, G and B, of one direction.
-    template <int count> void add(const SweptVoxels *const (&voxels)[count], const Sky &sky, const float direction[3]) {
+    /// Adds e^(-k n - body), k for R, G and B, of direction d.
+    template <int count> void add(const SweptVoxels *const (&voxels)[count], const Sky &sky, int d) {
+        const float *direction = sky.directions + 3 * d, share = kWhole / sky.count;
         auto &to = rows[dominant(direction) == 2];
-        const float share = kWhole / sky.count;
         sweep(voxels, sky.spacing, direction, [&](size_t at, const Floats (&tau)[count]) RINGLET_ALWAYS {
             for (int c = 0; c < 3; ++c) {
                 const Floats depth = count == 2 ? sky.loss[c] * tau[0] + tau[count - 1] : sky.loss[c] * tau[0];
-                Ints sums;
-                __builtin_memcpy(&sums, to[c].data() + at, sizeof sums);
-                sums += whole(exponential(-depth) * share + 0.5f);
-                __builtin_memcpy(to[c].data() + at, &sums, sizeof sums);
+                const Floats light = exponential(-depth) * share;
+                for (int k : {c, 3 + c}) {
+                    Ints sums;
+                    __builtin_memcpy(&sums, to[k].data() + at, sizeof sums);
+                    sums += whole(light * (k < 3 ? sky.weights[3 * d + c] : 1.0f) + 0.5f);
+                    __builtin_memcpy(to[k].data() + at, &sums, sizeof sums);
+                }
             }
         });
     }
 
     void add(const SkySums &others) {
         for (int across_z = 0; across_z < 2; ++across_z)
-            for (int c = 0; c < 3; ++c)
-                for (size_t i = 0; i < rows[across_z][c].size(); ++i) rows[across_z][c][i] += others.rows[across_z][c][i];
+            for (int k = 0; k < kSums; ++k)
+                for (size_t i = 0; i < rows[across_z][k].size(); ++i) rows[across_z][k][i] += others.rows[across_z][k][i];
     }
 };
 
-/// Writes the mean of e^(-k n - body) over all directions to entries 0, 1, 2 of records (nx, ny, nz, 8).
-inline void write_transmittance(const Sky &sky, float *records, int threads) {
+/// Writes the mean of e^(-k n - body) over all directions, weighted, to entries 0, 1, 2 of records (nx, ny, nz, 8), and as it
+/// is to those of `open` (nx, ny, nz, 4).
+inline void write_transmittance(const Sky &sky, float *records, float *open, int threads) {
     const SweptVoxels hair(sky.hair.data(), sky.n, threads);
     const std::optional<SweptVoxels> body = sky.body.empty() ? std::nullopt : std::optional<SweptVoxels>({sky.body.data(), sky.n, threads});
     SkySums all(sky.n);
@@ -95,8 +101,8 @@ inline void write_transmittance(const Sky &sky, float *records, int threads) {
         SkySums own(sky.n);
 #pragma omp for schedule(dynamic, 1) nowait
         for (int d = 0; d < sky.count; ++d) {
-            if (body) own.add<2>({&hair, &*body}, sky, sky.directions + 3 * d);
-            else own.add<1>({&hair}, sky, sky.directions + 3 * d);
+            if (body) own.add<2>({&hair, &*body}, sky, d);
+            else own.add<1>({&hair}, sky, d);
         }
 #pragma omp critical
         all.add(own);
@@ -104,10 +110,12 @@ inline void write_transmittance(const Sky &sky, float *records, int threads) {
     const Rows straight(sky.n, false), across(sky.n, true);
 #pragma omp parallel for schedule(static) num_threads(threads)
     for (int x = 0; x < sky.n[0]; ++x)
-        for (int c = 0; c < 3; ++c) {
-            const uint32_t *first = all.rows[0][c].data(), *other = all.rows[1][c].data();
-            straight.each(x, [&](size_t at, size_t voxel) RINGLET_ALWAYS { records[8 * voxel + c] = float(first[at]) * (1 / SkySums::kWhole); });
-            across.each(x, [&](size_t at, size_t voxel) RINGLET_ALWAYS { records[8 * voxel + c] += float(other[at]) * (1 / SkySums::kWhole); });
+        for (int k = 0; k < SkySums::kSums; ++k) {
+            const uint32_t *first = all.rows[0][k].data(), *other = all.rows[1][k].data();
+            float *to = k < 3 ? records + k : open + k - 3;
+            const size_t step = k < 3 ? 8 : 4;
+            straight.each(x, [&](size_t at, size_t voxel) RINGLET_ALWAYS { to[step * voxel] = float(first[at]) * (1 / SkySums::kWhole); });
+            across.each(x, [&](size_t at, size_t voxel) RINGLET_ALWAYS { to[step * voxel] += float(other[at]) * (1 / SkySums::kWhole); });
         }
 }
 

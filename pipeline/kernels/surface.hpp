@@ -136,8 +136,8 @@ inline void light_skin(const SkinPoints &p, const Illumination &light, const Occ
     const Floats albedo[3] = {p.albedo.x, p.albedo.y, p.albedo.z};
     // Just above the skin: what a half space sees of the sky is half of all directions
     const Vec3<float> g = in_voxels(light, p.x) + p.normal, above = from_centre(light, p.x);
-    Floats around[8];
-    read_surroundings(light, g, around);
+    Floats around[4];
+    read_sky<Four>(light, light.open, g, around);
     const Floats beyond = outside(light, g);
     Floats open_sky = splat(0.0f);
     for (int c = 0; c < 3; ++c) {

@@ -33,6 +33,7 @@ ABSORPTION_MAX: Final = 8.0
 """[1/radius] absorption at the last level: darker hair shows only its R lobe, as this does."""
 LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 52, 48, 140
 _DIRECTIONS: Final = 64
+_INCLINED, _AROUND = 8, 24  # fibres and azimuths of the mean answer to light from a direction
 _GREY: Final = 0.9999
 """Albedo of the whitest hair when the slant is looked for: in white hair nothing fades, aslant or not."""
 
@@ -92,6 +93,25 @@ def logistic_integral(x: _F64, s: float) -> _F64:
     turns = np.floor((x + np.pi) / (2 * np.pi))
     integral: _F64 = turns + np.tanh((x - 2 * np.pi * turns) / (2 * s)) / (2 * np.tanh(np.pi / (2 * s)))
     return integral
+
+
+def _along(cosines: _F64, sines: _F64, v: float) -> _F64:
+    """M from cos ti cos to and sin ti sin to, of variance v; I0 is the Bessel function."""
+    a = cosines / v
+    few, many = np.minimum(a, 50), np.maximum(a, 50)
+    series = np.sqrt(1 / (2 * np.pi * many)) * (1 + 1 / (8 * many) + 9 / (128 * many**2))
+    scaled = np.where(a < 50, np.i0(few) * np.exp(-few), series)
+    m: _F64 = scaled * np.exp(a - (1 + sines) / v) / (v * (1 - np.exp(-2 / v)))
+    return m
+
+
+def _between(table: _F64, x: _F64, y: _F64) -> _F64:
+    """Entries of a table (X, Y) at places 0 <= x <= X - 1, 0 <= y <= Y - 1, linear between neighbours."""
+    i = np.minimum(x.astype(int), table.shape[0] - 2)
+    j = np.minimum(y.astype(int), table.shape[1] - 2)
+    u, v = x - i, y - j
+    low, high = ((1 - v) * table[k, j] + v * table[k, j + 1] for k in (i, i + 1))
+    return np.asarray((1 - u) * low + u * high)
 
 
 @lru_cache
@@ -194,6 +214,37 @@ class Scattering:
         """
         a_f, a_b = (np.interp(np.sqrt(sigma), np.sqrt(self.levels), self.sums[:, 0, i]) for i in range(2))
         return np.sqrt(np.maximum((1 - a_f) ** 2 - a_b**2, 0)).astype(np.float32)
+
+    def answer(self, cosine: _F64, sigma: _F64) -> _F64:
+        """Radiance (D, 3) towards the eye by irradiance from a direction: the mean over fibres of all directions.
+
+        Args:
+            cosine: (D,) of the angle between the direction that light comes from and that to the eye.
+            sigma: (3,) [1/radius] absorption.
+
+        Each fibre counts as wide as the eye sees it. The tilt of its scales, which fibres of opposite directions turn to
+        opposite sides, is left out.
+
+        """
+        sine, weight = (each[:, None, None] for each in np.polynomial.legendre.leggauss(_INCLINED))
+        out = np.sqrt(1 - sine**2)
+        turn = (np.arange(_AROUND) + 0.5) * np.pi / _AROUND
+        # The eye is z, the fibre lies in the plane of x and z
+        arriving = (
+            out * np.sqrt(np.maximum(1 - cosine**2, 0))[:, None] * np.cos(turn) + sine * cosine[:, None]
+        )
+        across = np.sqrt(np.maximum(1 - arriving**2, 1e-9))
+        phi = np.arccos(np.clip((cosine[:, None] - arriving * sine) / (across * out), -1, 1))
+        theta, azimuth = np.arccos(out) * ((INCLINATIONS - 1) * 2 / np.pi), phi * ((AZIMUTHS - 1) / np.pi)
+        level = np.sqrt(np.minimum(sigma / ABSORPTION_MAX, 1)) * (LEVELS - 1)
+        below = np.minimum(level.astype(int), LEVELS - 2)
+        sums = np.zeros((3, cosine.size))
+        for lobe, v in zip(self.far_field[0], variances(self.roughness), strict=True):
+            seen = weight * out * _along(across * out, arriving * sine, v)
+            for c, (k, u) in enumerate(zip(below, level - below, strict=True)):
+                of_level = (1 - u) * lobe[k] + u * lobe[k + 1]
+                sums[c] += (seen * _between(of_level, theta, azimuth)).sum(axis=(0, 2))
+        return np.asarray(sums.T / (_AROUND * (weight * out).sum()))
 
     def tables(self, pigment: _F32) -> kernels.FibreTables:
         """The tables as the shading kernel takes them, with a `pipeline.render.pigment.table` (K, J, 4)."""

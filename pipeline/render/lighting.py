@@ -30,6 +30,8 @@ _CASTERS: Final = 200_000
 """Points of strands from which on not all cast shadows: of c times as many one in c^0.7."""
 _CASTER: Final = 41  # salt
 _SKY_DIRECTIONS: Final = 26
+_ANSWERS: Final = 65
+"""Cosines for which it is known what hair answers to light from there."""
 _OPAQUE: Final = 4
 """Times that the head is denser for the eye than for light: two voxels of it hide everything."""
 
@@ -47,7 +49,10 @@ def _evenly_spread(count: int) -> _F32:
 class _Shadowed:
     """What is known once all strands of a frame are in."""
 
-    light: kernels.Illumination
+    origin: _F64
+    """(3,) [m]: outer corner of the first voxel."""
+    spacing: float
+    """[m]"""
     head: kernels.DistanceField | None
     pose: _F64
     hair: _F32
@@ -68,15 +73,16 @@ class Lighting:
         scattering = fibre.Scattering(hair.roughness, hair.azimuthal_roughness, hair.tilt, hair.reciprocal)
         colours = pigment.table(hair)
         self._tables = scattering.tables(colours)
+        self._around = _evenly_spread(_SKY_DIRECTIONS)
+        middle = colours[:, colours.shape[1] // 2, :3]
+        self._cosines = np.linspace(-1, 1, _ANSWERS)
+        self._answer = scattering.answer(self._cosines, middle.mean(axis=0, dtype=np.float64))
         # Light that comes from everywhere has passed all of the strands
-        self._loss = (
-            scattering.loss(colours[:, colours.shape[1] // 2, :3])
-            .mean(axis=0, dtype=np.float64)
-            .astype(np.float32)
-        )
+        self._loss = scattering.loss(middle).mean(axis=0, dtype=np.float64).astype(np.float32)
         self._grid: kernels.DensityGrid | None = None
         self._shadows = kernels.Shadows(self._directions)  # its maps keep their memory from frame to frame
         self._frame: _Shadowed | None = None
+        self._seen: tuple[_F64, kernels.Illumination] | None = None
 
     def beside(self) -> "Lighting":
         """Another one with the same lights, for the frames between."""
@@ -104,7 +110,7 @@ class Lighting:
         self._every = max(math.ceil((points / _CASTERS) ** 0.7), 1)
         self._shadows.begin(low, low + size, spacing / _FINER, width, 1 / self._every)
         self._added = 0
-        self._frame = None
+        self._frame, self._seen = None, None
 
     def add(self, points: _F32, widths: _F32) -> None:
         """Add strands that cast shadows: points (S, P, 3) float32 [m], widths (S, P) float32 [m], in any chunks.
@@ -133,16 +139,7 @@ class Lighting:
         # A fibre seen from all sides shows pi / 4 of its length * width
         hair = density * np.float32(np.pi / 4)
         self._shadows.finish(hair, origin, grid.spacing, head, pose)
-        sky = kernels.surroundings(
-            hair,
-            body,
-            grid.spacing,
-            self._loss,
-            _evenly_spread(_SKY_DIRECTIONS),
-        )
-        light = kernels.Illumination(self._directions, self._irradiance, self._sky, self._shadows, sky)
-        light.origin, light.spacing, light.glints = grid.origin, grid.spacing, self._hair.glints
-        self._frame = _Shadowed(light, head, pose, hair, body)
+        self._frame = _Shadowed(origin, grid.spacing, head, pose, hair, body)
         self._grid = None
 
     def veil(self, eye: _F64, wider: float) -> Veil:
@@ -151,11 +148,11 @@ class Lighting:
         density = np.float32(wider) * frame.hair
         if frame.body is not None:
             density += np.float32(_OPAQUE) * frame.body
-        return Veil(density, np.array(frame.light.origin), frame.light.spacing, eye)
+        return Veil(density, frame.origin, frame.spacing, eye)
 
     def shader(self, eye: _F64) -> kernels.FibreShader:
         """Return what shades points of strands as seen from `eye` (3,) float64 [m]."""
-        return kernels.FibreShader(self._finished().light, self._tables, eye)
+        return kernels.FibreShader(self._light(eye), self._tables, eye)
 
     def shade(
         self, points: _F32, variation: _F32, key: NDArray[np.uint32], eye: _F64, which: NDArray[np.uint32]
@@ -164,7 +161,7 @@ class Lighting:
 
         The strands have variations (S, 3), see `pipeline.render.pigment`, and random keys (S,).
         """
-        return kernels.shade(points, variation, key, eye, self._finished().light, self._tables, which)
+        return kernels.shade(points, variation, key, eye, self._light(eye), self._tables, which)
 
     def shade_surface(
         self, points: _F32, normals: _F32, albedo: _F32, eye: _F64, curvature: _F32 | None = None
@@ -176,7 +173,28 @@ class Lighting:
         frame = self._finished()
         flat = np.zeros(len(points), np.float32) if curvature is None else curvature
         surface = kernels.Surface(points, normals, albedo, flat)
-        return kernels.shade_surface(surface, eye, frame.light, frame.head, frame.pose, self._loss)
+        return kernels.shade_surface(surface, eye, self._light(eye), frame.head, frame.pose, self._loss)
+
+    def _light(self, eye: _F64) -> kernels.Illumination:
+        """Lights and sky as an eye (3,) [m] sees them: of the light that comes from everywhere, hair that is seen sends
+        on most of what reaches it from behind.
+        """
+        if self._seen is not None and np.array_equal(self._seen[0], eye):
+            return self._seen[1]
+        frame, shadows = self._finished(), self._shadows
+        assert shadows is not None
+        toward = eye - (frame.origin + frame.spacing * np.array(frame.hair.shape) / 2)
+        cosines = self._around @ (toward / max(float(np.linalg.norm(toward)), 1e-9))
+        answer = np.stack([np.interp(cosines, self._cosines, each) for each in self._answer.T], axis=-1)
+        weights = (answer / answer.mean(axis=0)).astype(np.float32)
+        sky, everywhere = kernels.surroundings(
+            frame.hair, frame.body, frame.spacing, self._loss, self._around, weights
+        )
+        light = kernels.Illumination(self._directions, self._irradiance, self._sky, shadows, sky, everywhere)
+        x, y, z = (float(each) for each in frame.origin)
+        light.origin, light.spacing, light.glints = (x, y, z), frame.spacing, self._hair.glints
+        self._seen = np.array(eye), light
+        return light
 
     def _started(self) -> kernels.DensityGrid:
         if self._grid is None:

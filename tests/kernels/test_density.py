@@ -166,12 +166,15 @@ def test_surroundings_of_nothing_see_the_whole_sky_and_normals_point_out_of_the_
     n = 32
     directions = np.concatenate([np.eye(3), -np.eye(3)]).astype(np.float32)
     loss = np.array([0.0, 0.3, 0.9], np.float32)
-    empty = np.zeros((n, n, n), np.float32)
-    open_sky = kernels.surroundings(empty, empty, 1e-3, loss, directions)
-    assert np.abs(open_sky[..., :3] - 1).max() < 1e-6
+    empty, weights = np.zeros((n, n, n), np.float32), np.ones((6, 3), np.float32)
+    lopsided = 6 * (directions[:, :1] > 0) * weights
+    for weight in (weights, lopsided):
+        for open_sky in kernels.surroundings(empty, empty, 1e-3, loss, directions, weight):
+            assert np.abs(open_sky[..., :3] - 1).max() < 1e-6
     hair = empty.copy()
     hair[8:24, 8:24, 8:24] = 500
-    sky = kernels.surroundings(hair, empty, 1e-3, loss, directions)
+    sky, even = kernels.surroundings(hair, empty, 1e-3, loss, directions, weights)
+    assert np.array_equal(sky[..., :3], even[..., :3])
     # No loss, no shadow; more loss, more shadow
     assert np.abs(sky[..., 0] - 1).max() < 1e-6
     inside = sky[8, 8, 8]
@@ -179,6 +182,10 @@ def test_surroundings_of_nothing_see_the_whole_sky_and_normals_point_out_of_the_
     expected = np.exp(-loss[1] * 500 * 1e-3 * 8)
     assert inside[1] == pytest.approx(expected, rel=0.2)
     assert sky[4, 8, 8, 4] < 0 < sky[11, 8, 8, 4]
+    # Where hair answers only to light that comes along x, what lies there counts alone
+    from_x, _ = kernels.surroundings(hair, empty, 1e-3, loss, directions, lopsided)
+    assert from_x[13, 8, 8, 1] == pytest.approx(1, abs=1e-6)
+    assert from_x[2, 8, 8, 1] < 0.1 < sky[2, 8, 8, 1]
 
 
 @pytest.mark.parametrize(

@@ -98,3 +98,25 @@ def test_tables_are_quick_and_always_the_same() -> None:
     print(f"tables in {seconds:.2f} s")
     assert seconds < 5
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.4, 2.0])
+def test_the_mean_answer_to_light_from_everywhere_is_the_albedo(sigma: float) -> None:
+    """Over all directions of light; of fibres of all inclinations, each as wide as it is seen."""
+    hair = fibre.Scattering(0.3, 0.3, 0.0)
+    node, weight = np.polynomial.legendre.leggauss(200)
+    answer = hair.answer(node, np.full(3, sigma))[:, 0]
+    got = 2 * np.pi * weight @ answer
+    sine, share = np.polynomial.legendre.leggauss(40)
+    inclined = np.arccos(np.sqrt(1 - sine**2)) * 2 / np.pi * (fibre.INCLINATIONS - 1)
+    of_level = [
+        np.interp(np.sqrt(sigma), np.sqrt(hair.levels), sums) for sums in hair.sums[..., :2].sum(-1).T
+    ]
+    share = share * np.sqrt(1 - sine**2)
+    albedo = share @ np.interp(inclined, np.arange(fibre.INCLINATIONS), of_level) / share.sum()
+    behind = answer[node < -0.5].mean() / answer.mean()
+    print(
+        f"sigma {sigma}: answer to everything {got:.4f}, albedo {albedo:.4f}; from behind {behind:.1f} of the mean"
+    )
+    assert got == pytest.approx(albedo, rel=0.02)
+    assert behind > 1.5

@@ -49,6 +49,7 @@ class Room:
             np.full(3, self.sky, np.float32),
             shadows,
             around,
+            np.ones((n // 2, n // 2, n // 2, 4), np.float32),
         )
         light.glints = glints
         return light

@@ -67,6 +67,34 @@ def test_counts_are_those_of_exact_rays(light: int) -> None:
     assert seen[1] == pytest.approx(seen[0], abs=0.02)
 
 
+def test_points_that_are_seen_are_lit_as_exact_rays_say() -> None:
+    """Looked up a quarter of a node nearer the eye: what is seen lies before the mean of the strands around it."""
+    points, widths = straight(3000, 7)
+    rng = np.random.default_rng(8)
+    own, t = rng.integers(0, len(points), 12000), rng.uniform(0.2, 0.8, (12000, 1))
+    x = (points[own, 0] * (1 - t) + points[own, 1] * t).astype(float)
+    maps = shadows(points, widths)
+    for light, eye in (
+        (0, [0.5, 0.1, 0.86]),
+        (0, [-0.2, 0.9, 0.3]),
+        (1, [0.3, 0.3, -0.9]),
+        (2, [0.6, 0.5, 0.6]),
+    ):
+        toward = np.array(eye) / np.linalg.norm(eye)
+        seen = passed(points, x, own, toward) == 0
+        lit = (passed(points, x[seen], own[seen], LIGHTS[light].astype(float)) == 0).mean()
+        on_axis, nearer = (
+            np.exp(-maps.reach(light, (x[seen] + before * SPACING * toward).astype(np.float32))[:, 0]).mean()
+            for before in (0.0, 0.25)
+        )
+        print(
+            f"light {light}, {seen.sum()} seen: lit {nearer:.3f}, on the axis {on_axis:.3f}, exact {lit:.3f}"
+        )
+        assert nearer == pytest.approx(lit, abs=0.04)
+        if toward @ LIGHTS[light] > 0:
+            assert abs(nearer - lit) < 0.6 * abs(on_axis - lit)
+
+
 def test_a_few_wide_strands_cast_the_shadows_of_all() -> None:
     points, widths = straight(8000, 3)
     x = points[::8, 1].copy()

@@ -11,10 +11,16 @@ PICTURES = Path(__file__).parents[2].parent / "shared/reference/pictures"
 
 
 @pytest.mark.parametrize(
-    ("name", "colour"),
-    [("s1_brown", (0.07, 0.07, 0.07)), ("s1_black", (0.07, 0.10, 0.10)), ("s3_brown", (0.07, 0.07, 0.15))],
+    ("name", "colour", "correlation"),
+    [
+        ("s1_brown", 0.07, 0.97),
+        ("s1_black", 0.07, 0.97),
+        ("s2_brown", 0.07, 0.97),
+        ("s3_brown", 0.07, 0.97),
+        ("s4_brown", 0.09, 0.86),  # few curls: of 17 px so few patches are lit that their chance shows
+    ],
 )
-def test_hair_looks_like_path_traced_hair(name: str, colour: tuple[float, float, float]) -> None:
+def test_hair_looks_like_path_traced_hair(name: str, colour: float, correlation: float) -> None:
     """Colour, place of light and shadow, and detail: between the denoised picture's, too soft, and the noisy one's."""
     if not (PICTURES / "scenes.json").is_file():
         pytest.skip("the shared path-traced pictures are not on this machine")
@@ -29,7 +35,7 @@ def test_hair_looks_like_path_traced_hair(name: str, colour: tuple[float, float,
         f"{noisy.highlights[0]:.2f} for {smooth.highlights[1]:.2f} and {noisy.highlights[1]:.2f}"
     )
     assert (np.abs(np.array(noisy.ratio) - 1) < colour).all()
-    assert noisy.correlation > 0.97
+    assert noisy.correlation > correlation
     assert 0.85 * min(smooth.highlights[1], noisy.highlights[1]) < noisy.highlights[0]
     assert noisy.highlights[0] < 1.15 * max(smooth.highlights[1], noisy.highlights[1])
     if name != "s3_brown":  # its fibres cover pixels evenly: what varies there is noise of the path tracer
