@@ -64,11 +64,20 @@ struct TilePixels {
         return {every, every};
     }
     static TilePixels none() { return {Words{}, Words{}}; }
+    /// Those from column x and row y on, `side` of them each way.
+    static TilePixels square(int x, int y, int side) {
+        TilePixels pixels = none();
+        for (int b = y; b < y + side; ++b)
+            for (int a = x; a < x + side; ++a) pixels.add(a, b);
+        return pixels;
+    }
 
     bool has(int x, int y) const { return rows[y] >> x & 1; }
     bool some() const { return any<float>((Mask<float>)rows != 0); }
     void add(int x, int y) { rows[y] |= 1u << x, columns[x] |= 1u << y; }
-    void remove(int x, int y) { rows[y] &= ~(1u << x), columns[x] &= ~(1u << y); }
+    TilePixels operator&(const TilePixels &also) const { return {rows & also.rows, columns & also.columns}; }
+    TilePixels operator|(const TilePixels &or_else) const { return {rows | or_else.rows, columns | or_else.columns}; }
+    TilePixels without(const TilePixels &others) const { return {rows & ~others.rows, columns & ~others.columns}; }
 };
 
 /// A tile's rows, or columns: their numbers and middles.

@@ -38,11 +38,10 @@ class Painter {
                 lacking[tile] = TilePixels::none(), wrong[tile] = 0;
                 continue;
             }
-            tile_.begin(tile, wanted);
-            order_.begin(entries_[tile - block * kCount]);
-            lacking[tile] = draw(bins_.cut[tile]);
-            tile_.write(pictures_.colour);
-            if (pictures_.names) tile_.name([&](int x, int y, int k) { pictures_.names[size_t(y) * view_.W + x] = k < 0 ? 0 : key(k); });
+            const std::vector<uint64_t> &entries = entries_[tile - block * kCount];
+            lacking[tile] = paint(tile, wanted, entries);
+            const TilePixels mixed = tile_.mixed().without(lacking[tile]);
+            if (mixed.some()) lacking[tile] = lacking[tile] | paint_again(tile, mixed, entries);
             wrong[tile] = lacking[tile].some();
             still += wrong[tile];
         }
@@ -65,7 +64,7 @@ class Painter {
     std::vector<Segment> segments_; // of the block
     std::vector<uint32_t> number_;  // of each of them
     std::vector<uint8_t> shaded_;   // whether it has its colours
-    std::vector<uint64_t> entries_[kCount];
+    std::vector<uint64_t> entries_[kCount], again_, near_; // of the tiles, of mixed pixels, and of a square of them
     std::vector<uint32_t> uncoloured_; // segments that wait for the colours of their points
     std::vector<uint32_t> unshaded_;   // points
     std::vector<StrandPoint> to_shade_;
@@ -98,6 +97,48 @@ class Painter {
                 entries_[k].push_back(fragment(depth[k], uint32_t(i)));
             }
         }
+    }
+
+    /// Draws pixels of a tile; those that may lack hair from behind the cut-off.
+    TilePixels paint(int tile, const TilePixels &wanted, const std::vector<uint64_t> &entries) {
+        tile_.begin(tile, wanted);
+        return paint(tile, entries);
+    }
+
+    /// The same of a tile that has begun.
+    TilePixels paint(int tile, const std::vector<uint64_t> &entries) {
+        order_.begin(entries);
+        if (!entries.empty()) tile_.around(segments_[uint32_t(*order_.sorted(1)) - 1].d());
+        const TilePixels lacking = draw(bins_.cut[tile]);
+        tile_.write(pictures_.colour);
+        if (pictures_.names) tile_.name([&](int x, int y, int k) { pictures_.names[size_t(y) * view_.W + x] = k < 0 ? 0 : key(k); });
+        return lacking;
+    }
+
+    /// Draws mixed pixels in the order of depth in the middle of smaller squares. What closed them closes them again, so
+    /// that what is all behind it stays away.
+    TilePixels paint_again(int tile, const TilePixels &mixed, const std::vector<uint64_t> &entries) {
+        const float deepest = tile_.deepest();
+        tile_.begin(tile, mixed);
+        again_.clear();
+        for (const uint64_t entry : entries) {
+            const Segment &s = segments_[uint32_t(entry) - 1];
+            if (std::min(s.d(), s.d() + s.dd()) <= deepest && any<float>((Mask<float>)tile_.reached(s) != 0)) again_.push_back(entry);
+        }
+        TilePixels lacking = TilePixels::none();
+        for (int y = 0; y < kTile; y += Tile::kSquare)
+            for (int x = 0; x < kTile; x += Tile::kSquare) {
+                const TilePixels own = mixed & TilePixels::square(x, y, Tile::kSquare);
+                if (!own.some()) continue;
+                tile_.begin(tile, own);
+                near_.clear();
+                for (const uint64_t entry : again_) {
+                    const Segment &s = segments_[uint32_t(entry) - 1];
+                    if (any<float>((Mask<float>)tile_.reached(s) != 0)) near_.push_back(fragment(tile_.depth(s, x, y, Tile::kSquare), uint32_t(entry) - 1));
+                }
+                lacking = lacking | paint(tile, near_);
+            }
+        return lacking;
     }
 
     /// Draws the entries of a tile; the pixels that may lack hair from behind the cut-off.

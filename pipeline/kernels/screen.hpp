@@ -44,6 +44,12 @@ struct View {
 
     /// Depth of what is `distance` [m] away along the line of sight.
     float depth(float distance) const { return far / (far - near) * (1 - near / distance); }
+
+    /// How much depth grows by a step of distance [m] from a depth on, to first order.
+    float deeper(float depth, float step) const {
+        const float inverse = (far - depth * (far - near)) / (near * far); // of the distance there
+        return step * near * far / (far - near) * inverse * inverse;
+    }
 };
 
 /// 16 points (x, y, z) in a row.

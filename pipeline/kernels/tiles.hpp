@@ -3,6 +3,8 @@
 // Notation: T transmittance of each cell of a pixel, 1 where nothing covers it; a fragment of coverage c takes T c of
 // it. Segments come sorted by their depth near the tile's middle; within a pixel that is not exact, so each pixel holds
 // back the nearest two fragments until a third comes (a reorder window). A pixel whose mean T is below kClosed is closed.
+// Where thick layers cross within a tile that is too little: a pixel in which much was taken by fragments that lie
+// kBefore in front of what had been taken last is mixed, and is drawn again in the order of a smaller square.
 #pragma once
 
 #include "bins.hpp"
@@ -40,11 +42,18 @@ class Tile {
     static constexpr int kPixels = kTile * kTile;
     static constexpr int kWindow = 2;
     static constexpr float kClosed = 1.0f / 64;
+    static constexpr float kBefore = 4e-4f; // [m]
+    static constexpr float kMixed = 0.2f;   // of a pixel
+    static constexpr int kMany = 4, kSquare = 4; // pixels, and their sides
+    static constexpr float kLast = 0.15f;   // of a pixel, by what was taken last
 
     explicit Tile(const View &view) : view_(view) {}
 
     /// From now on over another picture. With names, notes which segment takes most of each pixel.
     void over(const Backdrop &back, bool names) { back_ = back, names_ = names; }
+
+    /// The hair of the tile is about as deep as this.
+    void around(float depth) { before_ = view_.deeper(depth, kBefore); }
 
     /// Starts a tile, of which these pixels are wanted.
     void begin(int tile, const TilePixels &wanted) {
@@ -53,6 +62,9 @@ class Tile {
         drawn_ = wanted;
         shallowest_ = 2;
         std::memset(window_, 0, sizeof window_);
+        std::memset(mixed_, 0, sizeof mixed_);
+        deepest_ = 0;
+        std::memset(last_, 0, sizeof last_);
         std::memset(shown_, 0, sizeof shown_);
         std::memset(most_, 0, sizeof most_);
         for (int p = 0; p < kPixels; ++p) {
@@ -133,6 +145,27 @@ class Tile {
         return pixels;
     }
 
+    /// The squares of kSquare pixels a side in which much was taken out of order, in kMany of their pixels.
+    TilePixels mixed() const {
+        TilePixels pixels = TilePixels::none();
+        for (int y = 0; y < kTile; y += kSquare)
+            for (int x = 0; x < kTile; x += kSquare) {
+                int many = 0;
+                for (int k = 0; k < kSquare * kSquare; ++k) many += mixed_[(y + k / kSquare) * kTile + x + k % kSquare] > kMixed;
+                if (many >= kMany) pixels = pixels | TilePixels::square(x, y, kSquare);
+            }
+        return pixels & drawn_;
+    }
+
+    /// Depth of the deepest fragment that was taken; without an end where a pixel is open.
+    float deepest() const { return std::any_of(clear_, clear_ + kPixels, [](float clear) { return clear >= kClosed; }) ? 2 : deepest_; }
+
+    /// Depth of a segment nearest the middle of the square from column x and row y on.
+    float depth(const Segment &s, int x, int y, int side) const {
+        const float middle = 0.5f * float(side - 1);
+        return s.d() + Crossing(s, x_[x] + middle, y_[y] + middle).t * s.dd();
+    }
+
     /// Writes the pixels that were drawn, linear RGB, into a picture (H, W, 3).
     void write(float *picture) const {
         for (int p = 0; p < kPixels; ++p) {
@@ -173,6 +206,9 @@ class Tile {
     float clear_[kPixels]; // mean of T; 0 where nothing is drawn
     Shown shown_[kPixels]; // sum of what was taken
     float nearest_[kPixels], farthest_[kPixels]; // depth of the backdrop
+    float mixed_[kPixels];                // taken out of order
+    float last_[kPixels];                 // mean depth of what was taken last
+    float deepest_ = 0, before_ = 0;      // largest depth that was taken; kBefore as depth
     Held window_[kPixels]; // fragments, ascending
     Most most_[kPixels];
     float shallowest_; // of the backdrop's farthest depths
@@ -226,9 +262,18 @@ class Tile {
         const Cells taken = T_[p] * part;
         T_[p] -= taken;
         const float weight = sum_cells(taken) * (1.0f / (kCells * kCells));
+        note(p, shown[3], weight, sum_cells(part) * (1.0f / (kCells * kCells)));
         shown_[p] += weight * shown;
         clear_[p] -= weight;
         if (names_ && weight > most_[p].part) most_[p] = {weight, uint32_t(held) - 1};
+    }
+
+    /// Notes that a fragment of this depth and coverage takes `weight` of pixel p: where it should have come before, what
+    /// it covers of that which is gone is wrong.
+    RINGLET_INLINE void note(uint32_t p, float depth, float weight, float coverage) {
+        mixed_[p] += depth + before_ < last_[p] ? coverage * (1 - clear_[p]) : 0;
+        last_[p] += std::min(weight * (1 / kLast), 1.0f) * (depth - last_[p]);
+        deepest_ = std::max(deepest_, depth);
     }
 
     /// Coverage of the cells whose backdrop is not in front of the depth.

@@ -121,6 +121,21 @@ def test_many_strands_look_as_by_16_x_16_samples() -> None:
     assert abs(float(np.mean(found - wanted))) < 0.002
 
 
+def test_thick_layers_are_parted_where_they_cross() -> None:
+    """Two sheets of strands pass through one another away from a tile's middle, where its strands are sorted."""
+    random, across, cross, slope, size = np.random.default_rng(8), 400, 0.15, 0.5, 48
+    x, y = random.uniform(-1, 1, (2, across, 1)) + np.zeros(2), np.array([-1.2, 1.2])
+    sheet = np.array([1.0, -1.0])[:, None, None] * slope * (y - cross) + random.normal(0, 0.1, (2, across, 1))
+    points = np.stack(np.broadcast_arrays(x, y, sheet), axis=-1).reshape(-1, 2, 3).astype(np.float32)
+    colours = (np.repeat(np.eye(3)[:2], across, axis=0)[:, None] + np.zeros((1, 2, 1))).astype(np.float32)
+    widths = np.full(points.shape[:2], 0.7 * 2 / size, np.float32)
+    found = draw(points, widths, colours, (size, size))
+    wanted = twin.drawn(points, widths, colours, np.full((size, size, 3), 0.2), 8)
+    rows, right = (each[:, 4:-4].mean(axis=1)[:, 0] for each in (found, wanted))
+    print("red in rows 12 to 32:", np.round(rows[12:33], 2), "for", np.round(right[12:33], 2))
+    assert np.abs(rows - right).max() < 0.25
+
+
 def test_a_strand_is_one_band_however_many_points_it_has() -> None:
     ends = np.array([[-0.6, -0.5, 0.1], [0.7, 0.4, -0.2]])
     pictures = []
