@@ -41,7 +41,7 @@ class Tile {
   public:
     static constexpr int kPixels = kTile * kTile;
     static constexpr int kWindow = 2;
-    static constexpr float kClosed = 1.0f / 64;
+    static constexpr float kClosed = 1.0f / 32;
     static constexpr float kBefore = 4e-4f; // [m]
     static constexpr float kMixed = 0.2f;   // of a pixel
     static constexpr int kMany = 4, kSquare = 4; // pixels, and their sides
@@ -262,16 +262,17 @@ class Tile {
         const Cells taken = T_[p] * part;
         T_[p] -= taken;
         const float weight = sum_cells(taken) * (1.0f / (kCells * kCells));
-        note(p, shown[3], weight, sum_cells(part) * (1.0f / (kCells * kCells)));
+        note(p, shown[3], weight);
         shown_[p] += weight * shown;
         clear_[p] -= weight;
         if (names_ && weight > most_[p].part) most_[p] = {weight, uint32_t(held) - 1};
     }
 
-    /// Notes that a fragment of this depth and coverage takes `weight` of pixel p: where it should have come before, what
-    /// it covers of that which is gone is wrong.
-    RINGLET_INLINE void note(uint32_t p, float depth, float weight, float coverage) {
-        mixed_[p] += depth + before_ < last_[p] ? coverage * (1 - clear_[p]) : 0;
+    /// Notes that a fragment of this depth takes `weight` of pixel p: where it should have come before, it is wrong by what
+    /// it would have taken of that which is gone.
+    RINGLET_INLINE void note(uint32_t p, float depth, float weight) {
+        const float missed = weight * ((1 - clear_[p]) / clear_[p]);
+        mixed_[p] += depth + before_ < last_[p] ? missed : 0.0f;
         last_[p] += std::min(weight * (1 / kLast), 1.0f) * (depth - last_[p]);
         deepest_ = std::max(deepest_, depth);
     }
