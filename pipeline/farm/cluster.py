@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 ATTEMPTS = 10  # workers that may die over one task before it is given up
+SILENT = logging.CRITICAL + 1  # Dask calls a line critical that tells of a client that went
 _CONNECT_S = 10
 _PRELOAD = "pipeline.farm.interrupts"
 
@@ -40,7 +41,7 @@ def share(workers: int) -> int:
 def quiet() -> None:
     """What Dask and what is below it tell, we tell in one line."""
     for name in ("distributed", "tornado", "asyncio"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+        logging.getLogger(name).setLevel(SILENT)
 
 
 def settings(threads: int) -> dict[str, Any]:
@@ -96,7 +97,7 @@ def local_cluster(workers: int) -> Iterator[str]:
             host="127.0.0.1",
             scheduler_kwargs={"dashboard": False},
             dashboard_address="127.0.0.1:0",  # of its pages for machines, any port that is free
-            silence_logs=logging.CRITICAL,
+            silence_logs=SILENT,
         ) as cluster,
     ):
         yield cluster.scheduler_address

@@ -1,11 +1,10 @@
 """One worker of a scheduler, for as long as there is one: what a machine of a farm runs."""
 
 import asyncio
-import logging
 import time
 
 from pipeline.errors import InputError
-from pipeline.farm.cluster import need_distributed, processors, quiet, settings
+from pipeline.farm.cluster import SILENT, need_distributed, processors, quiet, settings
 from pipeline.progress import say
 
 _AGAIN_S = 1.0
@@ -44,8 +43,6 @@ def serve(address: str, threads: int | None, patience: float) -> None:
 async def _serve(address: str, threads: int) -> None:
     from distributed import Nanny
 
-    async with Nanny(
-        address, nthreads=1, memory_limit=0, dashboard=False, silence_logs=logging.CRITICAL
-    ) as nanny:
+    async with Nanny(address, nthreads=1, memory_limit=0, dashboard=False, silence_logs=SILENT) as nanny:
         say("worker", f"working for {address} with {threads} thread{'' if threads == 1 else 's'}")
         await nanny.finished()
