@@ -42,10 +42,11 @@ class Tile {
     static constexpr int kPixels = kTile * kTile;
     static constexpr int kWindow = 2;
     static constexpr float kClosed = 1.0f / 32;
-    static constexpr float kBefore = 4e-4f; // [m]
-    static constexpr float kMixed = 0.2f;   // of a pixel
-    static constexpr int kMany = 4, kSquare = 4; // pixels, and their sides
-    static constexpr float kLast = 0.15f;   // of a pixel, by what was taken last
+    static constexpr float kBefore = 4e-4f; // [m] in front of what was taken last: out of order
+    static constexpr float kMixed = 0.2f;   // part of a pixel out of order from which on it is mixed
+    static constexpr float kLast = 0.15f;   // part of a pixel over which "what was taken last" is a mean
+    static constexpr int kSquare = 4;       // [px] side of the squares that are drawn again
+    static constexpr int kMany = 4;         // mixed pixels in such a square
 
     explicit Tile(const View &view) : view_(view) {}
 
