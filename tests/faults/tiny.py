@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -48,13 +47,7 @@ def start(outputs: Path, *options: str, verb: str = "run") -> "subprocess.Popen[
     """Begin a call whose standard error can be read."""
     line = command(outputs, *options, verb=verb)
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-    return subprocess.Popen(line, cwd=ROOT, text=True, preexec_fn=_hear_everything, **pipes)
-
-
-def _hear_everything() -> None:
-    """Shells switch signals off for what they start in the background; this child is to hear them."""
-    for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
+    return subprocess.Popen(line, cwd=ROOT, text=True, **pipes)
 
 
 def run(
