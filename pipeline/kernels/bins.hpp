@@ -146,6 +146,8 @@ struct Bins {
         void keep(int j, const float *widths, bool whole, uint32_t name, uint32_t first, int &last) {
             ScreenPoint ends[2] = {{at.x[j], at.y[j], at.d[j], at.h[j]}, {at.x[j + 1], at.y[j + 1], at.d[j + 1], at.h[j + 1]}};
             if (!whole && !clipped(view, at, widths, j, ends)) return;
+            if (j == 0 && ends[0].h > 0) ends[0].end();
+            if (j == strands.P - 2 && ends[1].h > 0) ends[1].end();
             const bool goes_on = whole && last == j - 1; // then the last point is there already
             const uint32_t segment = uint32_t(batch.seen.size()) - (goes_on ? 1 : 0);
             if (!visible(Segment(ends[0], ends[1]), name | segment)) return;

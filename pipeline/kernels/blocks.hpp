@@ -29,7 +29,7 @@ struct Touch {
 
     /// The block's corner is at (left, top) [px].
     RINGLET_INLINE Touch(const Segment &s, const TileMiddles &middle, float left, float top) {
-        const float reach = s.reach(), dx = s.ux * s.length, dy = s.uy * s.length;
+        const float reach = s.reach(), length = s.length(), dx = s.ux * length, dy = s.uy * length;
         const TileLanes x = middle.x + (left - s.x), y = middle.y + (top - s.y);
         const float wide = kTile * 0.5f * (std::abs(s.ux) + std::abs(s.uy)) + reach, far = kTile * 0.5f + reach;
         tiles = (magnitude(x * s.uy - y * s.ux) <= wide) & (magnitude(x - 0.5f * dx) <= far + 0.5f * std::abs(dx)) &
@@ -44,7 +44,7 @@ struct Touch {
 /// Calls visit(block, left, top) for the blocks that the box around a segment touches.
 template <class Visit> inline void visit_blocks(const View &view, const Segment &s, Visit &&visit) {
     constexpr float side = kSide * kTile, per_block = 1 / side;
-    const float reach = s.reach(), x1 = s.x + s.ux * s.length, y1 = s.y + s.uy * s.length;
+    const float reach = s.reach(), length = s.length(), x1 = s.x + s.ux * length, y1 = s.y + s.uy * length;
     const float left = std::min(s.x, x1) - reach, right = std::max(s.x, x1) + reach;
     const float top = std::min(s.y, y1) - reach, bottom = std::max(s.y, y1) + reach;
     // Compared as numbers: what lies far outside must not wrap when it becomes an integer
@@ -99,7 +99,7 @@ RINGLET_INLINE Words crossed(const Segment &s, float left, float top, const Tile
     const float x = s.x - left, y = s.y - top, half = std::max(s.h, s.h + s.dh);
     const bool rows = steep(s);
     const float p0 = rows ? y : x, q0 = rows ? x : y, up = rows ? s.uy : s.ux, uq = rows ? s.ux : s.uy;
-    const float p1 = p0 + up * s.length, reach = half * std::abs(uq) + 0.5f * margin + 0.5f, inverse = 1 / up;
+    const float p1 = p0 + up * s.length(), reach = half * std::abs(uq) + 0.5f * margin + 0.5f, inverse = 1 / up;
     const float slope = uq * inverse, wide = (half + margin) * std::abs(inverse) + (0.5f - margin) * std::abs(slope);
     const Floats middle = q0 + (step.middle - p0) * slope;
     const Floats low = minimum<float>(maximum<float>(middle - wide, splat(0.0f)), splat(float(kTile)));

@@ -111,10 +111,13 @@ struct ScreenStrand {
 
 /// A point as tiles need it.
 struct ScreenPoint {
-    float x, y, d, h;
+    float x, y, d;
+    float h; // negative where the strand ends
+
+    void end() { h = -h; }
 };
 
-/// The part of segment j of a strand that is in front of the near plane. False where nothing is.
+/// The part of segment j of a strand that is in front of the near plane, where the strand ends. False where nothing is.
 inline bool clipped(const View &view, const ScreenStrand &s, const float *widths, int j, ScreenPoint to[2]) {
     const float w0 = s.cw[j], w1 = s.cw[j + 1];
     if (!(w0 >= view.near || w1 >= view.near)) return false;
@@ -127,6 +130,7 @@ inline bool clipped(const View &view, const ScreenStrand &s, const float *widths
         to[end].y = (1 - between(s.cy[j], s.cy[j + 1]) * inverse) * (0.5f * view.H);
         to[end].d = std::max(slope * (1 - view.near * inverse), 0.0f);
         to[end].h = 0.5f * view.scale * between(widths[j], widths[j + 1]) * inverse;
+        if (t[end] != float(end)) to[end].end();
     }
     return true;
 }
@@ -134,28 +138,35 @@ inline bool clipped(const View &view, const ScreenStrand &s, const float *widths
 /// Linear RGB and depth.
 typedef float Shown __attribute__((vector_size(16)));
 
+/// Which ends of a segment are the strand's, too.
+enum Ends : uint32_t { kJoints = 0, kFirst = 1, kLast = 2 };
+
 /// A segment on the screen; depth, half width and colour are linear along it.
 struct alignas(64) Segment {
-    float x, y;            // where it begins
-    float ux, uy;          // unit direction
-    float length, inverse; // [px], [1/px]
-    float h, dh;           // half width at the beginning, and what it gains up to the end
-    Shown shown, gain;     // the same of colour and depth
+    float x, y;        // where it begins
+    float ux, uy;      // unit direction
+    float inverse;     // [1/px] of its length
+    uint32_t ends;     // of Ends
+    float h, dh;       // half width at the beginning, and what it gains up to the end
+    Shown shown, gain; // the same of colour and depth
 
     Segment() = default;
 
-    Segment(const ScreenPoint &a, const ScreenPoint &b) : x(a.x), y(a.y), h(a.h), dh(b.h - a.h), shown{0, 0, 0, a.d}, gain{0, 0, 0, b.d - a.d} {
+    Segment(const ScreenPoint &a, const ScreenPoint &b)
+        : x(a.x), y(a.y), ends((a.h < 0 ? kFirst : kJoints) | (b.h < 0 ? kLast : kJoints)), h(std::abs(a.h)), dh(std::abs(b.h) - std::abs(a.h)),
+          shown{0, 0, 0, a.d}, gain{0, 0, 0, b.d - a.d} {
         const float dx = b.x - a.x, dy = b.y - a.y;
-        length = std::sqrt(dx * dx + dy * dy), inverse = 1 / length;
+        inverse = 1 / std::sqrt(dx * dx + dy * dy);
         ux = dx * inverse, uy = dy * inverse;
     }
 
+    float length() const { return 1 / inverse; } // [px]
     float d() const { return shown[3]; }
     float dd() const { return gain[3]; }
 
     /// Whether it can be drawn: all of it finite, and neither endless nor a point.
     bool drawable() const {
-        const float most = std::max({std::abs(x), std::abs(y), std::abs(x + ux * length), std::abs(y + uy * length), h, h + dh});
+        const float length = this->length(), most = std::max({std::abs(x), std::abs(y), std::abs(x + ux * length), std::abs(y + uy * length), h, h + dh});
         return most < kOutermost && length >= kShortest && std::isfinite(x + y + d() + dd() + h + dh + length);
     }
 
