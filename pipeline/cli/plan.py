@@ -42,6 +42,8 @@ _RENDER_B_PER_SEGMENT = 14  # of strands that may be seen, sorted into tiles
 _LIGHT_B_PER_NODE = 200
 _LIGHT_B_PER_VOXEL = 40  # of density and sky
 _NODES = 9  # of a map over the square of the voxels along the longest side
+_LIGHT_B_PER_PIECE = 200  # of few strands, which light goes past one by one
+_LENGTH = 0.25  # [m] of a strand
 _BOUND_B = 70  # of a strand's binding in memory, and its order
 _PNG_B_PER_PIXEL = 0.5
 
@@ -134,13 +136,18 @@ def _render(config: Config) -> Cost:
 
 def _light(config: Config) -> float:
     """Bytes of shadow maps and grids."""
+    from pipeline.render.geometry import drawn_width
+    from pipeline.render.lighting import pieces, told_apart
     from pipeline.render.lights import as_directions
 
+    render = config.render
+    count = min(render.strands or _strands(config), _strands(config))
+    points = count * ((config.groom.points - 1) * render.subdivide + 1)
+    strands = points, count * _LENGTH, drawn_width(render, count, _strands(config))
     directions, _ = as_directions(config.scene.lights)
-    return (
-        _NODES * _LIGHT_B_PER_NODE * len(directions) * config.render.grid**2
-        + _LIGHT_B_PER_VOXEL * config.render.grid**3
-    )
+    each = _LIGHT_B_PER_PIECE * pieces(*strands) if told_apart(*strands) else 0.0
+    each += _NODES * _LIGHT_B_PER_NODE * render.grid**2
+    return len(directions) * each + _LIGHT_B_PER_VOXEL * render.grid**3
 
 
 def _strands(config: Config) -> int:

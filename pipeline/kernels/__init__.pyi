@@ -681,7 +681,15 @@ class Shadows:
     def __init__(self, directions: _F32) -> None:
         """Of lights in these directions: (L, 3) float32, unit vectors towards them."""
 
-    def begin(self, lower: _F64, upper: _F64, spacing: float, width: float, share: float = 1.0) -> None:
+    def begin(
+        self,
+        lower: _F64,
+        upper: _F64,
+        spacing: float,
+        width: float,
+        share: float = 1.0,
+        exact: bool = False,
+    ) -> None:
         """Empties the maps, in the memory that they have.
 
         Args:
@@ -690,6 +698,7 @@ class Shadows:
             spacing: [m], between the nodes of a map; the bounds are at most 2000 of it.
             width: [m], a typical drawn width.
             share: the part of all strands that is added, as much wider, to cast the shadows of all.
+            exact: so few strands are added that `lit` shall tell past which of them light goes.
 
         """
 
@@ -707,6 +716,18 @@ class Shadows:
             spacing: [m], of its voxels.
             field: the head in its rest frame.
             pose: (4, 4) float64, rest -> world.
+
+        """
+
+    def lit(self, light: int, axis: _F32, ways: _F32, roots: _F32, places: _F32) -> _F32:
+        """Parts (N,) of strands around points that a light reaches past all other strands, where shadows are exact.
+
+        Args:
+            light: its number.
+            axis: (N, 3) float32 [m], points of strands.
+            ways: (N, 2, 3) float32 [m], how far along the strand, to both sides; none beyond an end.
+            roots: (N, 3) float32 [m], the first points of the points' strands.
+            places: (N,) float32, where along them the points are: 0 .. 1.
 
         """
 

@@ -20,9 +20,9 @@ static void make_shadows(Shadows *shadows, Directions directions) {
     new (shadows) Shadows(std::move(held));
 }
 
-static void begin(Shadows &shadows, Doubles lower, Doubles upper, double spacing, double width, double share) {
+static void begin(Shadows &shadows, Doubles lower, Doubles upper, double spacing, double width, double share, bool exact) {
     Bounds bounds{};
-    bounds.spacing = float(spacing), bounds.width = float(width), bounds.share = float(share);
+    bounds.spacing = float(spacing), bounds.width = float(width), bounds.share = float(share), bounds.exact = exact;
     require(spacing > 0 && std::isfinite(spacing), "Shadows.begin: expected a positive spacing");
     require(width > 0 && std::isfinite(width), "Shadows.begin: expected a positive width");
     require(share > 0 && share <= 1, "Shadows.begin: expected a share of 0 .. 1");
@@ -73,6 +73,32 @@ static nb::ndarray<nb::numpy, float> reached(const Shadows &shadows, int light, 
     return result;
 }
 
+static nb::ndarray<nb::numpy, float> lit_parts(const Shadows &shadows, int light, Array<const float, -1, 3> axis, Array<const float, -1, 2, 3> ways,
+                                              Array<const float, -1, 3> roots, Array<const float, -1> places) {
+    require(light >= 0 && light < int(shadows.directions.size()), "Shadows.lit: no such light");
+    require(shadows.finished && !shadows.blockers[light].empty(), "Shadows.lit: finish exact shadows of strands first");
+    const size_t N = axis.shape(0);
+    require(ways.shape(0) == N && roots.shape(0) == N && places.shape(0) == N, "Shadows.lit: arrays differ in length");
+    auto result = new_array<float>({N});
+    float *out = result.data();
+    for (size_t first = 0; first < N; first += 16) {
+        Floats x[3], way[2][3], place;
+        Words strand;
+        for (size_t k = 0; k < 16; ++k) {
+            const size_t i = std::min(first + k, N - 1);
+            for (int c = 0; c < 3; ++c) {
+                x[c][k] = float(axis.data()[3 * i + c] - shadows.maps[light].centre[c]);
+                for (int side = 0; side < 2; ++side) way[side][c][k] = ways.data()[6 * i + 3 * side + c];
+            }
+            strand[k] = Casters::name(roots.data() + 3 * i), place[k] = places.data()[i];
+        }
+        const Around around{{x[0], x[1], x[2]}, {{way[0][0], way[0][1], way[0][2]}, {way[1][0], way[1][1], way[1][2]}}, strand, place};
+        const Floats lit = shadows.blockers[light].lit(shadows.maps[light], around, Ints{} - 1);
+        for (size_t k = 0; k < 16 && first + k < N; ++k) out[first + k] = lit[k];
+    }
+    return result;
+}
+
 static nb::tuple map_of(nb::handle self, int light) {
     Shadows &shadows = nb::cast<Shadows &>(self);
     require(light >= 0 && light < int(shadows.directions.size()), "Shadows.map: no such light");
@@ -87,11 +113,13 @@ static nb::tuple map_of(nb::handle self, int light) {
 void bind_shadow(nb::module_ &m) {
     nb::class_<Shadows>(m, "Shadows")
         .def("__init__", &make_shadows, nb::arg("directions"))
-        .def("begin", &begin, nb::arg("lower"), nb::arg("upper"), nb::arg("spacing"), nb::arg("width"), nb::arg("share") = 1.0)
+        .def("begin", &begin, nb::arg("lower"), nb::arg("upper"), nb::arg("spacing"), nb::arg("width"), nb::arg("share") = 1.0,
+             nb::arg("exact") = false)
         .def("add", &add, nb::arg("points"), nb::arg("widths"))
         .def("finish", &finish, nb::arg("hair"), nb::arg("origin"), nb::arg("spacing"), nb::arg("field").none(), nb::arg("pose"))
         .def("map", &map_of, nb::arg("light"))
-        .def("reach", &reached, nb::arg("light"), nb::arg("points"), nb::arg("own") = 0.0f);
+        .def("reach", &reached, nb::arg("light"), nb::arg("points"), nb::arg("own") = 0.0f)
+        .def("lit", &lit_parts, nb::arg("light"), nb::arg("axis"), nb::arg("ways"), nb::arg("roots"), nb::arg("places"));
 }
 
 } // namespace ringlet

@@ -11,10 +11,23 @@ namespace ringlet {
 /// Strands that cast shadows, kept until all are there.
 struct Casters {
     std::vector<float> x[3], widths; // (S, P) [m], points from the maps' centre on; behind them room for a whole vector
+    std::vector<uint32_t> names;     // (S,) a hash of where each begins
     size_t count = 0;                // S
     int P = 0;
 
-    void clear() { count = 0, P = 0; }
+    void clear() { count = 0, P = 0, names.clear(); }
+
+    /// Tells strands from one another, whoever holds them: by their first point. 0 and -0 are the same place.
+    static uint32_t name(const float *root) {
+        uint32_t hash = 0;
+        for (int k = 0; k < 3; ++k) {
+            const float x = root[k] + 0.0f;
+            uint32_t bits;
+            __builtin_memcpy(&bits, &x, sizeof bits);
+            hash = mix(hash + bits);
+        }
+        return hash;
+    }
 
     void add(const float *points, const float *wide, size_t S, int each, const std::array<double, 3> &centre) {
         const size_t first = count * each, more = S * each;
@@ -24,6 +37,7 @@ struct Casters {
         std::copy(wide, wide + more, widths.begin() + ptrdiff_t(first));
         for (int k = 0; k < 3; ++k)
             for (size_t i = 0; i < more; ++i) x[k][first + i] = float(points[3 * i + k] - centre[k]);
+        for (size_t s = 0; s < S; ++s) names.push_back(name(points + 3 * s * each));
     }
 };
 

@@ -74,9 +74,11 @@ struct FibrePoints {
     Layer layers[3];
     Floats passed, forward, back;   // green's a_f; variance that each fibre adds to light it passes, and of light from behind
     Words patch;                    // of 4 mm of its strand: from hash to hash evenly spread
+    Around around;                  // half a segment to both sides, half a patch at most; only where there are blockers
 };
 
 constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
+constexpr float kUnlit = 16;    // strands behind which no light is looked for
 // Nodes of a shadow map. Of the strands whose shadows a node sums up the eye sees the foremost: they lie before its mean.
 // `test_points_that_are_seen_are_lit_as_exact_rays_say`
 constexpr float kBefore = 0.25f;
@@ -105,6 +107,24 @@ inline void read_colour(const FibreTables &tables, Floats along, Floats u, Float
         const Floats g = 1.0f - sums[0], loss = square_root<float>(maximum<float>(g * g - sums[1] * sums[1], splat(1e-6f)));
         p.passed = sums[0], p.forward = p.rough * sums[6], p.back = p.rough * (sums[7] + 2.0f * sums[6] / (g + loss));
     }
+}
+
+/// The strands around 16 points of strands of P points: light on what lies farther than half a patch is other points'.
+__attribute__((noinline)) inline Around look_around(const StrandPoint (&points)[16], int P, const Illumination &light) {
+    float axis[3][16], ways[6][16], place[16];
+    uint32_t name[16];
+    for (int i = 0; i < 16; ++i) {
+        const int j = points[i].j;
+        const float *at = points[i].root + 3 * j, *before = j > 0 ? at - 3 : at, *after = j + 1 < P ? at + 3 : at;
+        for (int c = 0; c < 3; ++c) axis[c][i] = at[c], ways[c][i] = before[c] - at[c], ways[3 + c][i] = after[c] - at[c];
+        place[i] = float(j) / float(P - 1), name[i] = Casters::name(points[i].root);
+    }
+    Around around;
+    __builtin_memcpy(&around.axis, axis, sizeof axis), __builtin_memcpy(&around.ways, ways, sizeof ways);
+    __builtin_memcpy(&around.place, place, sizeof place), __builtin_memcpy(&around.strand, name, sizeof name);
+    around.axis = from_centre(light, around.axis);
+    for (Vec3<float> &way : around.ways) way = minimum<float>(splat(0.5f), 0.5f * kPatch / square_root<float>(dot(way, way) + 1e-30f)) * way;
+    return around;
 }
 
 /// Reads 16 points of strands of P points.
@@ -149,6 +169,7 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     __builtin_memcpy(differs, own, sizeof own);
     __builtin_memcpy(&place, along, sizeof along);
     read_colour(tables, place + differs[2], differs[0], differs[1], p);
+    if (light.lights && !light.shadows->blockers[0].empty()) p.around = look_around(points, P, light);
     return p;
 }
 
@@ -212,7 +233,11 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
 
     const Floats through = exponential(-way.n), past = exponential(-way.behind);
     const Words glint = p.patch + mix(uint32_t(l + 1));
-    const Floats alone = exponential(-before), seen = light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f)) : alone;
+    const Floats alone = exponential(-before);
+    const Blockers &blockers = light.shadows->blockers[l];
+    const Floats seen = !blockers.empty()  ? blockers.lit(map, p.around, (way.n < kUnlit) & (way.visible > 0.0f))
+                        : light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f))
+                                       : alone;
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
     for (int c = 0; c < 3; ++c) {
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);

@@ -1,6 +1,7 @@
 // The shadow maps of all lights, frame after frame, from strands that are added in any chunks.
 #pragma once
 
+#include "blockers.hpp"
 #include "shadow_fill.hpp"
 
 namespace ringlet {
@@ -10,6 +11,7 @@ struct Bounds {
     double lower[3], upper[3]; // [m]
     float spacing, width;      // [m] between nodes; a typical drawn width
     float share;               // part of all strands that casts shadows for all of them
+    bool exact;                // so few strands that it is told which of them a ray meets
 };
 
 /// Lays a map of the light in this direction over the bounds: two unit vectors across it are Duff et al., Building an
@@ -42,6 +44,7 @@ inline void lay(ShadowMap &map, const float L[3], const Bounds &bounds) {
 struct Shadows {
     std::vector<std::array<float, 3>> directions; // towards the lights
     std::vector<ShadowMap> maps;
+    std::vector<Blockers> blockers; // for each map, beside it; of none where strands are many
     Casters casters;
     ShadowFill fill;
     bool finished; // as soon as nothing is missing, which without lights is at once
@@ -51,7 +54,8 @@ struct Shadows {
 
     /// Forgets all strands; maps keep their memory.
     void begin(const Bounds &bounds) {
-        maps.resize(directions.size());
+        maps.resize(directions.size()), blockers.resize(directions.size());
+        exact_ = bounds.exact;
         for (size_t l = 0; l < maps.size(); ++l) lay(maps[l], directions[l].data(), bounds);
         casters.clear();
         finished = directions.empty();
@@ -71,8 +75,17 @@ struct Shadows {
             fill(maps[l], casters, voxels.deep_in(deep[l]), threads);
             find_solid(maps[l], field, pose, threads);
         }
+        // Lights side by side: nothing is shared between them
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+        for (size_t l = 0; l < maps.size(); ++l) {
+            blockers[l].clear();
+            if (exact_ && casters.count) blockers[l].fill(maps[l], casters);
+        }
         finished = true;
     }
+
+  private:
+    bool exact_ = false;
 };
 
 } // namespace ringlet

@@ -28,7 +28,7 @@ from pipeline.render.geometry import (
     taper,
 )
 from pipeline.render.layers import Layers
-from pipeline.render.lighting import Lighting
+from pipeline.render.lighting import Lighting, told_apart
 from pipeline.render.target import DECODED, Target, encode
 from pipeline.render.tone import CURVES, Pixels, average, develop
 from pipeline.render.view import Place, View
@@ -101,6 +101,8 @@ class FrameRenderer:
         self.strands, self.key, self.skin = strands, key, skin
         self.count = min(render.strands or strands.count, strands.count)
         self.width = drawn_width(render, self.count, strands.count)
+        self._points = self.count * ((strands.points - 1) * render.subdivide + 1)
+        self._exact = told_apart(self._points, self.count * strands.length, self.width)
         self.variation = pigment.variation(render.hair, config.seed, key)
         self._now = _Lit(Chunks(strands, self.count), Lighting(scene, render.hair, render.grid))
         self._next = self._now.beside(strands, self.count)
@@ -213,12 +215,13 @@ class FrameRenderer:
         """First pass: all strands into the density grid."""
         to.moment = None
         to.chunks.move(moment.guides, moment.pose, moment.moved)
-        to.lighting.begin(*_bounds(moment), self.width, self.count * self.strands.points)
+        cast = self._points if self._exact else self.count * self.strands.points
+        to.lighting.begin(*_bounds(moment), self.width, cast, self._exact)
         for first, points in to.chunks:
-            widths = self._own_widths(points)
-            to.lighting.add(points, widths)
+            drawn = smooth(points, self.render.subdivide) if self._exact else points
+            to.lighting.add(drawn, self._own_widths(drawn))
             if coverage is not None:
-                coverage.count(first, points, widths)
+                coverage.count(first, points, self._own_widths(points))
         skin = moment.skin or self.skin
         to.lighting.finish(skin.field if skin else None, moment.pose)
         to.moment = moment

@@ -29,6 +29,8 @@ _FINER: Final = 3
 _CASTERS: Final = 200_000
 """Points of strands from which on not all cast shadows: of c times as many one in c^0.7."""
 _CASTER: Final = 41  # salt
+_PIECES: Final = 400_000
+"""Points, and lengths of eight widths, of strands up to which it is told which of them light meets."""
 _SKY_DIRECTIONS: Final = 26
 _ANSWERS: Final = 65
 """Cosines for which it is known what hair answers to light from there."""
@@ -43,6 +45,16 @@ def _evenly_spread(count: int) -> _F32:
     turn = i * np.pi * (3 - np.sqrt(5))
     r = np.sqrt(1 - z**2)
     return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).astype(np.float32)
+
+
+def pieces(points: int, length: float, width: float) -> float:
+    """What it takes to let light go past single strands: of so many points, so long and so wide [m], in all."""
+    return points + length / (8 * width)
+
+
+def told_apart(points: int, length: float, width: float) -> bool:
+    """Whether light goes past single strands: it depends on neither camera nor frame."""
+    return points <= _CASTERS and pieces(points, length, width) <= _PIECES
 
 
 @dataclass(frozen=True)
@@ -90,8 +102,9 @@ class Lighting:
         other._shadows = kernels.Shadows(self._directions)
         return other
 
-    def begin(self, lower: _F64, upper: _F64, width: float, points: int = 0) -> None:
-        """Start a frame: bounds (3,) float64 [m] of all strands, a typical drawn width [m], how many points all have.
+    def begin(self, lower: _F64, upper: _F64, width: float, points: int = 0, exact: bool = False) -> None:
+        """Start a frame: bounds (3,) float64 [m] of all strands, a typical drawn width [m], how many points all have, and
+        whether they are `told_apart`.
 
         Raises:
             ValueError: bounds that are not finite or upside down.
@@ -108,7 +121,7 @@ class Lighting:
         self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width)
         low = np.asarray(lower, np.float64)
         self._every = max(math.ceil((points / _CASTERS) ** 0.7), 1)
-        self._shadows.begin(low, low + size, spacing / _FINER, width, 1 / self._every)
+        self._shadows.begin(low, low + size, spacing / _FINER, width, 1 / self._every, exact)
         self._added = 0
         self._frame, self._seen = None, None
 

@@ -15,6 +15,8 @@ from pipeline import kernels
 
 Points = NDArray[np.float32]
 
+_SOME = 1000  # strands that tell a mean
+
 
 @dataclass(frozen=True)
 class Binding:
@@ -106,6 +108,12 @@ class Expansion:
         )
         self._style = kernels.ExpandStyle(style.skin, style.clump, style.frizz)
         self.frame(guide_rest, np.eye(4))
+
+    @property
+    def length(self) -> float:
+        """Mean length [m] of the groom's strands at rest, of some of them where they are many."""
+        some = self._rest[:: max(len(self._rest) // _SOME, 1)]
+        return float(np.linalg.norm(np.diff(some, axis=1), axis=-1).sum(axis=1, dtype=np.float64).mean())
 
     def frame(self, guide_points: Points, pose: NDArray[np.float64], skin: "MovedSkin | None" = None) -> None:
         """Go to a moment: guides (G, Q, 3) float32 [m] in the world, pose (4, 4) head's rest frame -> world.
