@@ -93,7 +93,7 @@ static nb::ndarray<nb::numpy, float> lit_parts(const Shadows &shadows, int light
             strand[k] = Casters::name(roots.data() + 3 * i), place[k] = places.data()[i];
         }
         const Around around{{x[0], x[1], x[2]}, {{way[0][0], way[0][1], way[0][2]}, {way[1][0], way[1][1], way[1][2]}}, strand, place};
-        const Floats lit = shadows.blockers[light].lit(shadows.maps[light], around, Ints{} - 1);
+        const Floats lit = shadows.blockers[light].lit(shadows.maps[light], around);
         for (size_t k = 0; k < 16 && first + k < N; ++k) out[first + k] = lit[k];
     }
     return result;

@@ -48,8 +48,8 @@ class Blockers {
         });
     }
 
-    /// Part of the ways of 16 points that the map's light reaches. Only the `wanted` are looked at: 0 of the others.
-    Floats lit(const ShadowMap &map, const Around &around, Ints wanted) const {
+    /// Part of the ways of 16 points that the map's light reaches.
+    __attribute__((noinline)) Floats lit(const ShadowMap &map, const Around &around) const {
         alignas(64) float from[3][16], ways[6][16], segment[16], parts[16];
         alignas(64) uint32_t strand[16];
         for (int k = 0; k < 3; ++k) {
@@ -57,10 +57,7 @@ class Blockers {
             write(ways[k], on_axis(map.axis[k], around.ways[0])), write(ways[3 + k], on_axis(map.axis[k], around.ways[1]));
         }
         write(strand, around.strand), write(segment, around.place * float(segments_));
-        const uint32_t lanes = set_lanes<float>(wanted);
         for (int i = 0; i < 16; ++i) {
-            parts[i] = 0;
-            if (!(lanes >> i & 1)) continue;
             int places = 0, hides = 0;
             for (int side = 0; side < 6; side += 3) {
                 const Stretch one{{from[0][i], from[1][i], from[2][i]}, {ways[side][i], ways[side + 1][i], ways[side + 2][i]}, strand[i], segment[i]};

@@ -74,11 +74,12 @@ struct FibrePoints {
     Layer layers[3];
     Floats passed, forward, back;   // green's a_f; variance that each fibre adds to light it passes, and of light from behind
     Words patch;                    // of 4 mm of its strand: from hash to hash evenly spread
-    Around around;                  // half a segment to both sides, half a patch at most; only where there are blockers
+    bool exact;                     // it is known where light goes past single strands
+    Around around;                  // if so, half a segment to both sides, half a patch at most,
+    Floats lit;                     // and the part of it that one light reaches
 };
 
 constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
-constexpr float kUnlit = 16;    // strands behind which no light is looked for
 // Nodes of a shadow map. Of the strands whose shadows a node sums up the eye sees the foremost: they lie before its mean.
 // `test_points_that_are_seen_are_lit_as_exact_rays_say`
 constexpr float kBefore = 0.25f;
@@ -169,7 +170,8 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     __builtin_memcpy(differs, own, sizeof own);
     __builtin_memcpy(&place, along, sizeof along);
     read_colour(tables, place + differs[2], differs[0], differs[1], p);
-    if (light.lights && !light.shadows->blockers[0].empty()) p.around = look_around(points, P, light);
+    p.exact = light.lights && !light.shadows->blockers[0].empty();
+    if (p.exact) p.around = look_around(points, P, light);
     return p;
 }
 
@@ -233,11 +235,8 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
 
     const Floats through = exponential(-way.n), past = exponential(-way.behind);
     const Words glint = p.patch + mix(uint32_t(l + 1));
-    const Floats alone = exponential(-before);
-    const Blockers &blockers = light.shadows->blockers[l];
-    const Floats seen = !blockers.empty()  ? blockers.lit(map, p.around, (way.n < kUnlit) & (way.visible > 0.0f))
-                        : light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f))
-                                       : alone;
+    const Floats alone = exponential(-before), chance = light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f)) : alone;
+    const Floats seen = p.exact ? p.lit : chance;
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
     for (int c = 0; c < 3; ++c) {
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
@@ -258,7 +257,10 @@ inline void light_block(FibrePoints &p, const Illumination &light, const FibreTa
     const Vec3<float> out{around[4], around[5], around[6]};
     const Vec3<float> normal = (1.0f / square_root<float>(dot(out, out) + 1e-20f)) * out;
     for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * p.albedo[c] * (p.layers[c].ratio + (1.0f - p.layers[c].ratio) * around[c]);
-    for (int l = 0; l < light.lights; ++l) add_light(p, light, l, tables, normal, radiance);
+    for (int l = 0; l < light.lights; ++l) {
+        if (p.exact) p.lit = light.shadows->blockers[l].lit(light.shadows->maps[l], p.around);
+        add_light(p, light, l, tables, normal, radiance);
+    }
 }
 
 /// Shades points as an eye sees them.
