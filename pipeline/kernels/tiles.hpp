@@ -38,25 +38,24 @@ RINGLET_INLINE uint64_t fragment(float depth, uint32_t number) {
 
 /// The fragments of a tile in the order in which they came: what compositing needs of each.
 struct Fragments {
-    std::vector<float> off, reach, most, t; // where the pixel's centre lies across the segment, its band, part that lies before it
-    std::vector<uint32_t> segment;          // its number, and Tile::kSpecial
+    std::vector<int32_t> pixel, depth;      // depth: its bits
+    std::vector<int32_t> segment;           // its number, and Tile::kSpecial
+    std::vector<float> t, off, reach, most; // part of the segment before the pixel's centre, how far across that lies, the band
     int count = 0;
 
     /// Makes room for so many more.
     void room(int more) {
         const size_t needed = size_t(count) + size_t(more);
         if (needed <= t.size()) return;
-        for (auto *each : {&off, &reach, &most, &t}) each->resize(2 * needed);
-        segment.resize(2 * needed);
+        for (auto *each : {&pixel, &depth, &segment}) each->resize(2 * needed);
+        for (auto *each : {&t, &off, &reach, &most}) each->resize(2 * needed);
     }
 
-    /// Adds those that are set; how many they are.
-    RINGLET_INLINE int add(Mask<float> some, Floats across, const Band &band, Floats part, Mask<float> number) {
+    /// Adds those that are set.
+    RINGLET_INLINE void add(Mask<float> some, Mask<float> in, Floats d, Mask<float> of, Floats part, Floats across, const Band &band) {
+        write_chosen(some, in, &pixel[count]), write_chosen(some, (Mask<float>)d, &depth[count]), write_chosen(some, of, &segment[count]);
         pack_set_lanes(some, across, &off[count]), pack_set_lanes(some, band.reach, &reach[count]), pack_set_lanes(some, band.most, &most[count]);
-        write_chosen(some, number, (int32_t *)&segment[count]);
-        const int added = pack_set_lanes(some, part, &t[count]);
-        count += added;
-        return added;
+        count += pack_set_lanes(some, part, &t[count]);
     }
 
     RINGLET_INLINE Band band(uint32_t k) const { return {splat(reach[k]), splat(most[k])}; }
@@ -89,7 +88,7 @@ class Tile {
         for (int k = 0; k < kTile; ++k) x_[k] = float(left_ + k) + 0.5f, y_[k] = float(top_ + k) + 0.5f;
         drawn_ = wanted;
         shallowest_ = 2, closest_ = 2;
-        fragments_.count = 0;
+        fragments_.count = 0, drawn_to_ = 0;
         std::memset(window_, 0, sizeof window_);
         std::memset(mixed_, 0, sizeof mixed_);
         deepest_ = splat(0.0f);
@@ -149,29 +148,29 @@ class Tile {
         }
     }
 
-    /// The open pixels that a segment may touch, for `draw`.
+    /// The open pixels that a segment may touch, for `add`.
     RINGLET_INLINE Words reached(const Segment &s) const { return crossed(s, float(left_), float(top_), open_, step_); }
 
     /// Adds the fragments of segment `number` of the block, in the pixels that are still open of those it has reached.
-    RINGLET_INLINE void draw(const Segment *segments, uint32_t number, const Words &reached) {
-        int32_t pixel[kPixels + kLanes<float>], depth[kPixels + kLanes<float>];
-        uint32_t which[kPixels];
-        const uint32_t first = uint32_t(fragments_.count) + 1;
-        const int count = fragments(segments[number], number, reached, pixel, depth);
-        int out = 0; // first all that come to the windows, so that what is composited then waits for no branch
-        for (int i = 0; i < count; ++i) {
-            const int32_t p = pixel[i];
-            which[out] = hold(uint32_t(p), int64_t(depth[i]) << 32 | (first + uint32_t(i))), pixel[out] = p;
-            out += (which[out] != 0) & is_open(p);
+    RINGLET_INLINE void add(const Segment *segments, uint32_t number, const Words &reached) { fragments(segments[number], number, reached); }
+
+    /// Draws what was added. All fragments of some segments in a row: no loop over few pixels ends unforeseen.
+    RINGLET_INLINE void draw(const Segment *segments) {
+        const uint32_t count = uint32_t(fragments_.count);
+        if (out_.size() <= count - drawn_to_) out_.resize(2 * (count - drawn_to_) + 1);
+        size_t out = 0;
+        for (; drawn_to_ < count; ++drawn_to_) {
+            out_[out] = hold(fragments_.pixel[drawn_to_], int64_t(fragments_.depth[drawn_to_]) << 32 | (drawn_to_ + 1));
+            out += out_[out] != 0;
         }
-        for (int i = 0; i < out; ++i) composite(segments, uint32_t(pixel[i]), which[i] - 1);
+        for (size_t i = 0; i < out; ++i) composite(segments, out_[i] - 1);
     }
 
     /// Composites what is held back.
     void finish(const Segment *segments) {
         for (int p = 0; p < kPixels; ++p)
             for (int i = 0; i < kWindow; ++i)
-                if (window_[p][i] && is_open(p)) composite(segments, uint32_t(p), uint32_t(window_[p][i]) - 1);
+                if (window_[p][i]) composite(segments, uint32_t(window_[p][i]) - 1);
     }
 
     /// The pixels that are open and see beyond a depth.
@@ -253,15 +252,16 @@ class Tile {
     Most most_[kPixels];
     float shallowest_, closest_; // of the backdrop's farthest and nearest depths
     Fragments fragments_;
+    uint32_t drawn_to_ = 0;     // of them
+    std::vector<uint32_t> out_; // of the windows: number + 1
     TilePixels open_, drawn_;
     CellCentres centres_;
     TileSteps step_;
 
     bool is_open(int p) const { return clear_[p] >= kClosed; }
 
-    /// The open pixels that a segment has reached, in front of the backdrop, and the bits of its depth there. What else is
-    /// needed of these fragments is kept.
-    RINGLET_INLINE int fragments(const Segment &s, uint32_t number, const Words &reached, int32_t *pixel, int32_t *depth) {
+    /// The open pixels that a segment has reached, in front of the backdrop.
+    RINGLET_INLINE void fragments(const Segment &s, uint32_t number, const Words &reached) {
         const bool rows = steep(s);
         const float deepest = std::max(s.d(), s.d() + s.dd());
         const bool behind = deepest > shallowest_, beside = deepest > closest_;
@@ -270,7 +270,6 @@ class Tile {
         const float off_line = rows ? s.ux : -s.uy, off_first = rows ? -s.uy : s.ux, end = kNearEnd * s.inverse;
         const Floats start = (step_.middle + line0) * by_line, off = (step_.middle + line0) * off_line;
         fragments_.room(kPixels + kLanes<float>);
-        int count = 0;
         for (Words left = reached & (rows ? open_.rows : open_.columns); any<float>((Mask<float>)left != 0); left &= left - 1) {
             // The first pixel of each line, by the exponent of its bit
             const Mask<float> bit = (Mask<float>)(left & -left);
@@ -282,29 +281,29 @@ class Tile {
             if (behind) some &= d <= gather_floats(farthest_, p);
             if (beside) special |= d > gather_floats(nearest_, p);
             deepest_ = select<float>(some, maximum<float>(deepest_, d), deepest_);
-            write_chosen(some, p, pixel + count), write_chosen(some, (Mask<float>)d, depth + count);
-            const Band band(s.h + t * s.dh);
-            count += fragments_.add(some, off + at * off_first, band, t, Mask<float>{} + int32_t(number) + (special & int32_t(kSpecial)));
+            const Mask<float> tagged = (special & int32_t(kSpecial)) | int32_t(number);
+            fragments_.add(some, p, d, tagged, t, off + at * off_first, Band(s.h + t * s.dh));
         }
-        return count;
     }
 
     RINGLET_INLINE Crossing crossing(const Segment &s, uint32_t p) const { return Crossing(s, x_[p % kTile], y_[p / kTile]); }
 
     /// Puts a fragment into its pixel's window; the number + 1 of the nearest that the window has no room for, or 0.
-    RINGLET_INLINE uint32_t hold(uint32_t p, int64_t next) {
+    RINGLET_INLINE uint32_t hold(int32_t p, int64_t next) {
         const Held every = Held{} + next, held = window_[p], later = every > held ? every : held;
         const Held after = {held[1], INT64_MAX};
         window_[p] = later < after ? later : after;
         return uint32_t((every < held ? every : held)[0]);
     }
 
-    RINGLET_INLINE void composite(const Segment *segments, uint32_t p, uint32_t k) {
-        const uint32_t number = fragments_.segment[k] & ~kSpecial;
+    RINGLET_INLINE void composite(const Segment *segments, uint32_t k) {
+        const uint32_t p = uint32_t(fragments_.pixel[k]);
+        if (!is_open(p)) return;
+        const uint32_t number = uint32_t(fragments_.segment[k]) & ~kSpecial;
         const Segment &s = segments[number];
         const Shown shown = s.shown + fragments_.t[k] * s.gain;
         Cells part = across(s, fragments_.off[k], fragments_.band(k), centres_);
-        if (fragments_.segment[k] & kSpecial) {
+        if (fragments_.segment[k] < 0) {
             part *= along(s, crossing(s, p), centres_);
             if (shown[3] > nearest_[p]) part = in_front(part, shown[3], left_ + int(p % kTile), top_ + int(p / kTile));
         }
