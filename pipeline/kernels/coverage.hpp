@@ -52,20 +52,29 @@ struct Crossing {
     }
 };
 
-/// Covered part of each cell.
-RINGLET_INLINE Cells covered(const Segment &s, const Crossing &at, const CellCentres &cell) {
-    constexpr float inverse = kCells, half_cell = 0.5f / kCells, near_end = 0.75f;
-    const float half = s.h + at.t * s.dh;
-    const Cells v = at.across + s.ux * cell.y - s.uy * cell.x;
-    Cells part = clamp_cells((half + half_cell - magnitude(v)) * inverse, 0, std::min(1.0f, 2 * inverse * half));
-    if (at.along < near_end || (at.along + near_end) * s.inverse > 1) {
-        const Cells u = at.along + s.ux * cell.x + s.uy * cell.y, one = splat(1.0f), none{};
-        if (s.ends == kJoints) return select<float>((u >= 0) & (u * s.inverse < 1), part, none);
-        const Cells past = s.ends & kLast ? clamp_cells((1 / s.inverse - u) * inverse + 0.5f, 0, 1) : select<float>(u * s.inverse < 1, one, none);
-        const Cells before = s.ends & kFirst ? clamp_cells(u * -inverse + 0.5f, 0, 1) : select<float>(u < 0, one, none);
-        part *= past - before;
-    }
-    return part;
+inline constexpr float kNearEnd = 0.75f; // [px] from the middle of a pixel to the farthest end of a segment that touches its cells
+
+/// How far across a segment of this half width [px] cells are covered, and how much of them at most.
+struct Band {
+    Floats reach, most;
+
+    Band(Floats reach, Floats most) : reach(reach), most(most) {}
+    explicit RINGLET_INLINE Band(Floats half) : reach(half * kCells + 0.5f), most(minimum<float>(half * (2 * kCells), splat(1.0f))) {}
+};
+
+/// Part of each cell that a segment covers which passes the pixel's centre at this distance.
+RINGLET_INLINE Cells across(const Segment &s, float centre, const Band &band, const CellCentres &cell) {
+    const Cells v = centre + s.ux * cell.y - s.uy * cell.x;
+    return minimum<float>(maximum<float>(band.reach - magnitude(v) * kCells, splat(0.0f)), band.most);
+}
+
+/// The same along the segment.
+RINGLET_INLINE Cells along(const Segment &s, const Crossing &at, const CellCentres &cell) {
+    constexpr float inverse = kCells;
+    const Cells u = at.along + s.ux * cell.x + s.uy * cell.y, one = splat(1.0f), none{};
+    const Cells past = s.ends & kLast ? clamp_cells((s.length() - u) * inverse + 0.5f, 0, 1) : select<float>(u * s.inverse < 1, one, none);
+    const Cells before = s.ends & kFirst ? clamp_cells(u * -inverse + 0.5f, 0, 1) : select<float>(u < 0, one, none);
+    return past - before;
 }
 
 } // namespace ringlet

@@ -147,7 +147,7 @@ class Painter {
         const uint64_t certain = fragment(cut, UINT32_MAX - 1);
         TilePixels lacking = TilePixels::none();
         bool passed = false;
-        for (size_t k = 0; k < order_.size() && !tile_.closed(); k += kPortion, tile_.find_open()) {
+        for (size_t k = 0; k < order_.size() && !tile_.closed(); k += kPortion) {
             const size_t end = std::min(k + kPortion, order_.size()), count = end - k;
             const uint64_t *entry = order_.sorted(end) + k;
             for (size_t i = 0; i < count; ++i) {
@@ -157,10 +157,15 @@ class Painter {
                 if (any<float>((Mask<float>)reached_[i] != 0)) want(drawn_[i]);
             }
             shade();
-            for (size_t i = 0; i < count && !tile_.closed(); ++i) {
-                if (i % kLook == kLook - 1) tile_.find_open();
-                if (!passed && entry[i] > certain) lacking = tile_.open_beyond(cut), passed = true;
-                tile_.draw(segments_.data(), drawn_[i], reached_[i]);
+            for (size_t i = 0; i < count && !tile_.closed(); tile_.find_open()) {
+                for (const size_t last = std::min(i + kLook, count); i < last; ++i) {
+                    if (!passed && entry[i] > certain) {
+                        tile_.draw(segments_.data());
+                        lacking = tile_.open_beyond(cut), passed = true;
+                    }
+                    tile_.add(segments_.data(), drawn_[i], reached_[i]);
+                }
+                tile_.draw(segments_.data());
             }
         }
         if (!passed) lacking = tile_.open_beyond(cut);

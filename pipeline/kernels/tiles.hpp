@@ -36,6 +36,31 @@ RINGLET_INLINE uint64_t fragment(float depth, uint32_t number) {
     return uint64_t(bits) << 32 | (number + 1);
 }
 
+/// The fragments of a tile in the order in which they came: what compositing needs of each.
+struct Fragments {
+    std::vector<int32_t> pixel, depth;      // depth: its bits
+    std::vector<int32_t> segment;           // its number, and Tile::kSpecial
+    std::vector<float> t, off, reach, most; // part of the segment before the pixel's centre, how far across that lies, the band
+    int count = 0;
+
+    /// Makes room for so many more.
+    void room(int more) {
+        const size_t needed = size_t(count) + size_t(more);
+        if (needed <= t.size()) return;
+        for (auto *each : {&pixel, &depth, &segment}) each->resize(2 * needed);
+        for (auto *each : {&t, &off, &reach, &most}) each->resize(2 * needed);
+    }
+
+    /// Adds those that are set.
+    RINGLET_INLINE void add(Mask<float> some, Mask<float> in, Floats d, Mask<float> of, Floats part, Floats across, const Band &band) {
+        write_chosen(some, in, &pixel[count]), write_chosen(some, (Mask<float>)d, &depth[count]), write_chosen(some, of, &segment[count]);
+        pack_set_lanes(some, across, &off[count]), pack_set_lanes(some, band.reach, &reach[count]), pack_set_lanes(some, band.most, &most[count]);
+        count += pack_set_lanes(some, part, &t[count]);
+    }
+
+    RINGLET_INLINE Band band(uint32_t k) const { return {splat(reach[k]), splat(most[k])}; }
+};
+
 /// A tile while it is drawn.
 class Tile {
   public:
@@ -47,6 +72,7 @@ class Tile {
     static constexpr float kLast = 0.15f;   // part of a pixel over which "what was taken last" is a mean
     static constexpr int kSquare = 4;       // [px] side of the squares that are drawn again
     static constexpr int kMany = 4;         // mixed pixels in such a square
+    static constexpr uint32_t kSpecial = 1u << 31; // of a fragment near an end of its segment, or behind a part of the backdrop
 
     explicit Tile(const View &view) : view_(view) {}
 
@@ -61,10 +87,11 @@ class Tile {
         left_ = view_.left(tile), top_ = view_.top(tile);
         for (int k = 0; k < kTile; ++k) x_[k] = float(left_ + k) + 0.5f, y_[k] = float(top_ + k) + 0.5f;
         drawn_ = wanted;
-        shallowest_ = 2;
+        shallowest_ = 2, closest_ = 2;
+        fragments_.count = 0, drawn_to_ = 0;
         std::memset(window_, 0, sizeof window_);
         std::memset(mixed_, 0, sizeof mixed_);
-        deepest_ = 0;
+        deepest_ = splat(0.0f);
         std::memset(last_, 0, sizeof last_);
         std::memset(shown_, 0, sizeof shown_);
         std::memset(most_, 0, sizeof most_);
@@ -81,7 +108,7 @@ class Tile {
                     const float d = back_.depth[back_.sample(view_, x, y, i, j)];
                     nearest_[p] = std::min(nearest_[p], d), farthest_[p] = std::max(farthest_[p], d);
                 }
-            shallowest_ = std::min(shallowest_, farthest_[p]);
+            shallowest_ = std::min(shallowest_, farthest_[p]), closest_ = std::min(closest_, nearest_[p]);
         }
         find_open();
     }
@@ -121,21 +148,29 @@ class Tile {
         }
     }
 
-    /// The open pixels that a segment may touch, for `draw`.
+    /// The open pixels that a segment may touch, for `add`.
     RINGLET_INLINE Words reached(const Segment &s) const { return crossed(s, float(left_), float(top_), open_, step_); }
 
     /// Adds the fragments of segment `number` of the block, in the pixels that are still open of those it has reached.
-    RINGLET_INLINE void draw(const Segment *segments, uint32_t number, const Words &reached) {
-        int32_t pixel[kPixels + kLanes<float>], depth[kPixels + kLanes<float>];
-        const int count = fragments(segments[number], reached, pixel, depth);
-        for (int i = 0; i < count; ++i) hold(segments, uint32_t(pixel[i]), int64_t(depth[i]) << 32 | (number + 1));
+    RINGLET_INLINE void add(const Segment *segments, uint32_t number, const Words &reached) { fragments(segments[number], number, reached); }
+
+    /// Draws what was added. All fragments of some segments in a row: no loop over few pixels ends unforeseen.
+    RINGLET_INLINE void draw(const Segment *segments) {
+        const uint32_t count = uint32_t(fragments_.count);
+        if (out_.size() <= count - drawn_to_) out_.resize(2 * (count - drawn_to_) + 1);
+        size_t out = 0;
+        for (; drawn_to_ < count; ++drawn_to_) {
+            out_[out] = hold(fragments_.pixel[drawn_to_], int64_t(fragments_.depth[drawn_to_]) << 32 | (drawn_to_ + 1));
+            out += out_[out] != 0;
+        }
+        for (size_t i = 0; i < out; ++i) composite(segments, out_[i] - 1);
     }
 
     /// Composites what is held back.
     void finish(const Segment *segments) {
         for (int p = 0; p < kPixels; ++p)
             for (int i = 0; i < kWindow; ++i)
-                if (window_[p][i]) composite(segments, uint32_t(p), window_[p][i]);
+                if (window_[p][i]) composite(segments, uint32_t(window_[p][i]) - 1);
     }
 
     /// The pixels that are open and see beyond a depth.
@@ -158,8 +193,10 @@ class Tile {
         return pixels & drawn_;
     }
 
-    /// Depth of the deepest fragment that was taken; without an end where a pixel is open.
-    float deepest() const { return std::any_of(clear_, clear_ + kPixels, [](float clear) { return clear >= kClosed; }) ? 2 : deepest_; }
+    /// Depth behind which nothing was taken; without an end where a pixel is open.
+    float deepest() const {
+        return std::any_of(clear_, clear_ + kPixels, [](float clear) { return clear >= kClosed; }) ? 2 : largest<float>(deepest_);
+    }
 
     /// Depth of a segment nearest the middle of the square from column x and row y on.
     float depth(const Segment &s, int x, int y, int side) const {
@@ -209,73 +246,82 @@ class Tile {
     float nearest_[kPixels], farthest_[kPixels]; // depth of the backdrop
     float mixed_[kPixels];                // taken out of order
     float last_[kPixels];                 // mean depth of what was taken last
-    float deepest_ = 0, before_ = 0;      // largest depth that was taken; kBefore as depth
+    float before_ = 0;                    // kBefore as depth
+    Floats deepest_;                      // largest depth of fragments
     Held window_[kPixels]; // fragments, ascending
     Most most_[kPixels];
-    float shallowest_; // of the backdrop's farthest depths
+    float shallowest_, closest_; // of the backdrop's farthest and nearest depths
+    Fragments fragments_;
+    uint32_t drawn_to_ = 0;     // of them
+    std::vector<uint32_t> out_; // of the windows: number + 1
     TilePixels open_, drawn_;
     CellCentres centres_;
     TileSteps step_;
 
     bool is_open(int p) const { return clear_[p] >= kClosed; }
 
-    /// The open pixels that a segment has reached, in front of the backdrop, and the bits of its depth there.
-    RINGLET_INLINE int fragments(const Segment &s, const Words &reached, int32_t *pixel, int32_t *depth) const {
+    /// The open pixels that a segment has reached, in front of the backdrop.
+    RINGLET_INLINE void fragments(const Segment &s, uint32_t number, const Words &reached) {
         const bool rows = steep(s);
-        const bool behind = std::max(s.d(), s.d() + s.dd()) > shallowest_;
+        const float deepest = std::max(s.d(), s.d() + s.dd());
+        const bool behind = deepest > shallowest_, beside = deepest > closest_;
         const float x = float(left_) - s.x, y = float(top_) - s.y;
         const float line0 = rows ? y : x, first0 = rows ? x : y, by_line = rows ? s.uy : s.ux, by_first = rows ? s.ux : s.uy;
-        const Floats start = (step_.middle + line0) * by_line;
-        int count = 0;
+        const float off_line = rows ? s.ux : -s.uy, off_first = rows ? -s.uy : s.ux, end = kNearEnd * s.inverse;
+        const Floats start = (step_.middle + line0) * by_line, off = (step_.middle + line0) * off_line;
+        fragments_.room(kPixels + kLanes<float>);
         for (Words left = reached & (rows ? open_.rows : open_.columns); any<float>((Mask<float>)left != 0); left &= left - 1) {
             // The first pixel of each line, by the exponent of its bit
             const Mask<float> bit = (Mask<float>)(left & -left);
             const Mask<float> first = bit == 0 ? bit : ((Mask<float>)__builtin_convertvector(bit, Floats) >> 23) - 127;
             const Mask<float> p = rows ? step_.line * kTile + first : first * kTile + step_.line;
-            const Floats along = start + (__builtin_convertvector(first, Floats) + (0.5f + first0)) * by_first;
-            const Floats d = s.d() + s.dd() * minimum<float>(maximum<float>(along * s.inverse, splat(0.0f)), splat(1.0f));
-            Mask<float> some = bit != 0;
+            const Floats at = __builtin_convertvector(first, Floats) + (0.5f + first0), along = (start + at * by_first) * s.inverse;
+            const Floats t = minimum<float>(maximum<float>(along, splat(0.0f)), splat(1.0f)), d = s.d() + s.dd() * t;
+            Mask<float> some = bit != 0, special = (along < end) | (along > 1 - end);
             if (behind) some &= d <= gather_floats(farthest_, p);
-            write_chosen(some, p, pixel + count);
-            count += write_chosen(some, (Mask<float>)d, depth + count);
+            if (beside) special |= d > gather_floats(nearest_, p);
+            deepest_ = select<float>(some, maximum<float>(deepest_, d), deepest_);
+            const Mask<float> tagged = (special & int32_t(kSpecial)) | int32_t(number);
+            fragments_.add(some, p, d, tagged, t, off + at * off_first, Band(s.h + t * s.dh));
         }
-        return count;
     }
 
     RINGLET_INLINE Crossing crossing(const Segment &s, uint32_t p) const { return Crossing(s, x_[p % kTile], y_[p / kTile]); }
 
-    /// Puts a fragment into its pixel's window; the nearest that the window has no room for is composited.
-    RINGLET_INLINE void hold(const Segment *segments, uint32_t p, int64_t next) {
+    /// Puts a fragment into its pixel's window; the number + 1 of the nearest that the window has no room for, or 0.
+    RINGLET_INLINE uint32_t hold(int32_t p, int64_t next) {
         const Held every = Held{} + next, held = window_[p], later = every > held ? every : held;
         const Held after = {held[1], INT64_MAX};
-        const int64_t out = (every < held ? every : held)[0];
         window_[p] = later < after ? later : after;
-        if (out) composite(segments, p, out);
+        return uint32_t((every < held ? every : held)[0]);
     }
 
-    RINGLET_INLINE void composite(const Segment *segments, uint32_t p, int64_t held) {
+    RINGLET_INLINE void composite(const Segment *segments, uint32_t k) {
+        const uint32_t p = uint32_t(fragments_.pixel[k]);
         if (!is_open(p)) return;
-        const Segment &s = segments[uint32_t(held) - 1];
-        const Crossing at = crossing(s, p);
-        Cells part = covered(s, at, centres_);
-        const Shown shown = s.shown + at.t * s.gain;
-        if (shown[3] > nearest_[p]) part = in_front(part, shown[3], left_ + int(p % kTile), top_ + int(p / kTile));
+        const uint32_t number = uint32_t(fragments_.segment[k]) & ~kSpecial;
+        const Segment &s = segments[number];
+        const Shown shown = s.shown + fragments_.t[k] * s.gain;
+        Cells part = across(s, fragments_.off[k], fragments_.band(k), centres_);
+        if (fragments_.segment[k] < 0) {
+            part *= along(s, crossing(s, p), centres_);
+            if (shown[3] > nearest_[p]) part = in_front(part, shown[3], left_ + int(p % kTile), top_ + int(p / kTile));
+        }
         const Cells taken = T_[p] * part;
         T_[p] -= taken;
         const float weight = sum_cells(taken) * (1.0f / (kCells * kCells));
         note(p, shown[3], weight);
         shown_[p] += weight * shown;
         clear_[p] -= weight;
-        if (names_ && weight > most_[p].part) most_[p] = {weight, uint32_t(held) - 1};
+        if (names_ && weight > most_[p].part) most_[p] = {weight, number};
     }
 
     /// Notes that a fragment of this depth takes `weight` of pixel p: where it should have come before, it is wrong by what
     /// it would have taken of that which is gone.
     RINGLET_INLINE void note(uint32_t p, float depth, float weight) {
         const float missed = weight * ((1 - clear_[p]) / clear_[p]);
-        mixed_[p] += depth + before_ < last_[p] ? missed : 0.0f;
+        mixed_[p] += missed * (depth + before_ < last_[p] ? 1.0f : 0.0f); // a factor, for no branch can tell it in time
         last_[p] += std::min(weight * (1 / kLast), 1.0f) * (depth - last_[p]);
-        deepest_ = std::max(deepest_, depth);
     }
 
     /// Coverage of the cells whose backdrop is not in front of the depth.
