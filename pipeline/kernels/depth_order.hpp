@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <vector>
 
 namespace ringlet {
@@ -12,7 +13,7 @@ namespace ringlet {
 class DepthOrder {
   public:
     /// Takes entries, depth << 32 | number, where depth is the bits of a positive float. Slices of depth hold about 8.
-    void begin(const std::vector<uint64_t> &entries) {
+    void begin(std::span<const uint64_t> entries) {
         count_ = entries.size(), sorted_ = 0, slice_ = 0;
         order_.resize(count_);
         if (count_ == 0) return;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "depth_order.hpp"
+#include "segment_lanes.hpp"
 #include "strand_point.hpp"
 #include "tiles.hpp"
 
@@ -33,12 +34,12 @@ class Painter {
         for (int tile = block * kCount; tile < (block + 1) * kCount; ++tile) {
             if (!wrong[tile]) continue;
             const TilePixels wanted = bins_.wanted.empty() ? TilePixels::all() : bins_.wanted[tile];
-            if (entries_[tile - block * kCount].empty() && bins_.cut[tile] >= solid_[tile] && !pictures_.names) {
+            const std::span<const uint64_t> entries = entries_.of(tile - block * kCount);
+            if (entries.empty() && bins_.cut[tile] >= solid_[tile] && !pictures_.names) {
                 tile_.bare(tile, wanted, pictures_.colour);
                 lacking[tile] = TilePixels::none(), wrong[tile] = 0;
                 continue;
             }
-            const std::vector<uint64_t> &entries = entries_[tile - block * kCount];
             lacking[tile] = paint(tile, wanted, entries);
             const TilePixels mixed = tile_.mixed().without(lacking[tile]);
             if (mixed.some()) lacking[tile] = lacking[tile] | paint_again(tile, mixed, entries);
@@ -49,7 +50,7 @@ class Painter {
     }
 
   private:
-    static constexpr int kCount = kSide * kSide, kAhead = 16;
+    static constexpr int kCount = kSide * kSide, kAhead = 32;
     static constexpr size_t kPortion = 128; // entries that are shaded together
     static constexpr size_t kLook = 32;     // entries from one look at which pixels are open to the next
 
@@ -59,12 +60,12 @@ class Painter {
     const PointShader *shader_ = nullptr;
     Pictures pictures_{};
     Tile tile_;
-    TileMiddles middle_;
     DepthOrder order_;
     std::vector<Segment> segments_; // of the block
     std::vector<uint32_t> number_;  // of each of them
     std::vector<uint8_t> shaded_;   // whether it has its colours
-    std::vector<uint64_t> entries_[kCount], again_, near_; // of the tiles, of mixed pixels, and of a square of them
+    TileEntries entries_;
+    std::vector<uint64_t> again_, near_; // entries of mixed pixels, and of a square of them
     std::vector<uint32_t> uncoloured_; // segments that wait for the colours of their points
     std::vector<uint32_t> unshaded_;   // points
     std::vector<StrandPoint> to_shade_;
@@ -79,34 +80,35 @@ class Painter {
     }
 
     void sort_into_tiles(int block, const uint32_t *number, size_t count, const uint8_t *wrong) {
+        constexpr size_t step = SegmentLanes::kCount;
         const float left = float(view_.left(block * kCount)), top = float(view_.top(block * kCount));
         TileLanes cut;
-        Mask<float> waiting;
         std::memcpy(&cut, &bins_.cut[size_t(block) * kCount], sizeof cut);
-        for (int k = 0; k < kCount; ++k) waiting[k] = wrong[block * kCount + k] ? -1 : 0, entries_[k].clear();
-        segments_.resize(count), number_.assign(number, number + count), shaded_.assign(count, 0);
-        for (size_t i = 0; i < count; ++i) {
-            if (i + kAhead < count) fetch(bins_.at(number[i + kAhead]));
-            const ScreenPoint *ends = bins_.at(number[i]);
-            const Segment &s = segments_[i] = Segment(ends[0], ends[1]);
-            const Touch touch(s, middle_, left, top);
-            alignas(64) float depth[kCount];
-            std::memcpy(depth, &touch.depth, sizeof depth);
-            for (uint32_t tiles = set_lanes<float>(touch.tiles & waiting & (touch.nearest <= cut)); tiles; tiles &= tiles - 1) {
-                const int k = __builtin_ctz(tiles);
-                entries_[k].push_back(fragment(depth[k], uint32_t(i)));
+        uint32_t waiting = 0;
+        for (int k = 0; k < kCount; ++k) waiting |= uint32_t(wrong[block * kCount + k] != 0) << k;
+        entries_.clear();
+        segments_.resize((count + step - 1) / step * step), number_.assign(number, number + count), shaded_.assign(count, 0);
+        for (size_t first = 0; first < count; first += step) {
+            const ScreenPoint *begin[step];
+            Mask<float> some;
+            for (size_t i = 0; i < step; ++i) {
+                begin[i] = bins_.at(number[std::min(first + i, count - 1)]), some[i] = first + i < count ? -1 : 0;
+                if (first + i + kAhead < count) fetch(bins_.at(number[first + i + kAhead]));
             }
+            const SegmentLanes lanes(begin);
+            lanes.write(&segments_[first]);
+            entries_.add(lanes, some, uint32_t(first), left, top, cut, waiting);
         }
     }
 
     /// Draws pixels of a tile; those that may lack hair from behind the cut-off.
-    TilePixels paint(int tile, const TilePixels &wanted, const std::vector<uint64_t> &entries) {
+    TilePixels paint(int tile, const TilePixels &wanted, std::span<const uint64_t> entries) {
         tile_.begin(tile, wanted);
         return paint(tile, entries);
     }
 
     /// The same of a tile that has begun.
-    TilePixels paint(int tile, const std::vector<uint64_t> &entries) {
+    TilePixels paint(int tile, std::span<const uint64_t> entries) {
         order_.begin(entries);
         if (!entries.empty()) tile_.around(segments_[uint32_t(*order_.sorted(1)) - 1].d());
         const TilePixels lacking = draw(bins_.cut[tile]);
@@ -117,7 +119,7 @@ class Painter {
 
     /// Draws mixed pixels in the order of depth in the middle of smaller squares. What closed them closes them again, so
     /// that what is all behind it stays away.
-    TilePixels paint_again(int tile, const TilePixels &mixed, const std::vector<uint64_t> &entries) {
+    TilePixels paint_again(int tile, const TilePixels &mixed, std::span<const uint64_t> entries) {
         const float deepest = tile_.deepest();
         tile_.begin(tile, mixed);
         again_.clear();

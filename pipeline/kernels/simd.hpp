@@ -183,6 +183,26 @@ RINGLET_INLINE int pack_set_lanes(Mask<float> mask, Lanes<float> values, float *
 #endif
 }
 
+/// Writes high << 32 | low of the lanes that are set, one after the other, and how many there are comes back. All of
+/// to[0 .. kLanes - 1] may be written to.
+RINGLET_INLINE int write_chosen_pairs(Mask<float> mask, Mask<float> low, Mask<float> high, uint64_t *to) {
+    const uint32_t bits = set_lanes<float>(mask);
+#ifdef __AVX512F__
+    const __m512i chosen_low = _mm512_maskz_compress_epi32(__mmask16(bits), __m512i(low));
+    const __m512i chosen_high = _mm512_maskz_compress_epi32(__mmask16(bits), __m512i(high));
+    const __m512i first = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    const __m512i second = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+    _mm512_storeu_si512(to, _mm512_permutex2var_epi32(chosen_low, first, chosen_high));
+    _mm512_storeu_si512(to + 8, _mm512_permutex2var_epi32(chosen_low, second, chosen_high));
+#else
+    for (uint32_t left = bits; left; left &= left - 1) {
+        const int lane = __builtin_ctz(left);
+        *to++ = uint64_t(uint32_t(high[lane])) << 32 | uint32_t(low[lane]);
+    }
+#endif
+    return __builtin_popcount(bits);
+}
+
 /// Reads values[at] and values[at + 1] of every lane.
 template <class Real>
 RINGLET_INLINE void gather_pairs(const float *values, Mask<Real> at, Lanes<Real> &first, Lanes<Real> &second) {
