@@ -1,6 +1,7 @@
 // The head and the sky on the density grid: body density, mean transmittance towards the sky, outward normal.
 #pragma once
 
+#include "arena.hpp"
 #include "density.hpp"
 #include "distance_field.hpp"
 #include "elementary.hpp"
@@ -86,11 +87,14 @@ struct SkySums {
     static constexpr float kWhole = 1 << 28; // of all directions; sums may be a few times as much, and negative
     static constexpr int kSums = 6 + Answer::kMirrored;
 
-    std::vector<int32_t> rows[2][kSums];
+    LargeBlock memory;
+    int32_t *rows[2][kSums]; // what they are before the first direction means nothing
+    bool begun[2] = {false, false};
 
-    explicit SkySums(const int n[3]) {
+    explicit SkySums(const int n[3]) : memory(sizeof(int32_t) * kSums * (Rows(n, false).size() + Rows(n, true).size())) {
+        int32_t *next = reinterpret_cast<int32_t *>(memory.data());
         for (int across_z = 0; across_z < 2; ++across_z)
-            for (auto &channel : rows[across_z]) channel.resize(Rows(n, across_z).size());
+            for (int32_t *&channel : rows[across_z]) channel = next, next += Rows(n, across_z).size();
     }
 
     /// Adds e^(-k n - body), k for R, G and B, of directions that meet the slices in the same order: together, as it costs more
@@ -99,7 +103,9 @@ struct SkySums {
         std::vector<Sweep<count>> sweeps;
         for (int d : together) sweeps.emplace_back(voxels, sky.spacing, sky.directions + 3 * d);
         const Sweep<count> &first = sweeps[0];
-        auto &to = rows[dominant(sky.directions + 3 * together[0]) == 2];
+        const int across_z = dominant(sky.directions + 3 * together[0]) == 2;
+        const Ints kept = begun[across_z] ? Ints{} - 1 : Ints{};
+        int32_t *const *to = rows[across_z];
         for (int k = 0; k < first.slices(); ++k) {
             for (int line = 0; line < first.lines(); ++line)
                 for (size_t j = 0; j < first.length(); j += 16) {
@@ -108,13 +114,14 @@ struct SkySums {
                     for (size_t i = 0; i < together.size(); ++i) at = add_step(sweeps[i], k, line, j, sky, together[i], sums);
                     for (int q = 0; q < kSums; ++q) {
                         Ints all;
-                        __builtin_memcpy(&all, to[q].data() + at, sizeof all);
-                        all += whole(sums[q] * (kWhole / sky.count));
-                        __builtin_memcpy(to[q].data() + at, &all, sizeof all);
+                        __builtin_memcpy(&all, to[q] + at, sizeof all);
+                        all = (all & kept) + whole(sums[q] * (kWhole / sky.count));
+                        __builtin_memcpy(to[q] + at, &all, sizeof all);
                     }
                 }
             for (Sweep<count> &sweep : sweeps) sweep.next();
         }
+        begun[across_z] = true;
     }
 
     /// What comes to 16 voxels from direction d; their place.
@@ -140,12 +147,27 @@ struct SkySums {
     }
 };
 
-/// The k-th sum of all threads.
-inline std::vector<const int32_t *> of_threads(const std::vector<std::unique_ptr<SkySums>> &all, int across_z, int k) {
-    std::vector<const int32_t *> sums;
+/// Adds up what threads have of slab x and visits (k, value of the k-th sum, number in (nx, ny, nz)).
+template <class Visit>
+RINGLET_INLINE void each_sum(const std::vector<std::unique_ptr<SkySums>> &all, const int n[3], int across_z, int x, Visit &&visit) {
+    std::vector<const SkySums *> begun;
     for (const auto &own : all)
-        if (own) sums.push_back(own->rows[across_z][k].data());
-    return sums;
+        if (own && own->begun[across_z]) begun.push_back(own.get());
+    const Rows rows(n, across_z);
+    const int line = across_z ? 2 : 1, along = 3 - line;
+    for (int i = 0; i < n[line]; ++i)
+        for (int j = 0; j < n[along]; j += 16)
+            for (int k = 0; k < SkySums::kSums; ++k) {
+                Ints sum{};
+                for (const SkySums *own : begun) {
+                    Ints part;
+                    __builtin_memcpy(&part, own->rows[across_z][k] + x * rows.stride(0) + i * rows.stride(line) + j, sizeof part);
+                    sum += part;
+                }
+                const Floats value = real(sum) * (1 / SkySums::kWhole);
+                for (int lane = 0; lane < 16 && j + lane < n[along]; ++lane)
+                    visit(k, value[lane], (size_t(x) * n[1] + (across_z ? j + lane : i)) * n[2] + (across_z ? i : j + lane));
+            }
 }
 
 /// Writes the mean of e^(-k n - body) over all directions, as hair answers, to entries 0, 1, 2 of records (nx, ny, nz, 16), what
@@ -165,22 +187,14 @@ inline void write_transmittance(const Sky &sky, float *records, float *open, int
             else own->add<1>({&hair}, sky, groups[k]);
         }
     }
+    const auto to = [&](int k, size_t voxel) RINGLET_ALWAYS -> float & {
+        return k < 3 ? records[16 * voxel + k] : k < 6 ? open[4 * voxel + k - 3] : records[16 * voxel + k + 2];
+    };
 #pragma omp parallel for schedule(static) num_threads(threads)
-    for (int x = 0; x < sky.n[0]; ++x)
-        for (int k = 0; k < SkySums::kSums; ++k) {
-            float *to = k < 3 ? records + k : k < 6 ? open + k - 3 : records + k + 2;
-            const size_t step = k < 3 || k >= 6 ? 16 : 4;
-            for (const int across_z : {0, 1}) {
-                const std::vector<const int32_t *> sums = of_threads(all, across_z, k);
-                const Rows rows(sky.n, across_z);
-                rows.each(x, [&](size_t at, size_t voxel) RINGLET_ALWAYS {
-                    int32_t sum = 0;
-                    for (const int32_t *own : sums) sum += own[at];
-                    const float light = float(sum) * (1 / SkySums::kWhole);
-                    to[step * voxel] = across_z ? to[step * voxel] + light : light;
-                });
-            }
-        }
+    for (int x = 0; x < sky.n[0]; ++x) {
+        each_sum(all, sky.n, false, x, [&](int k, float light, size_t voxel) RINGLET_ALWAYS { to(k, voxel) = light; });
+        each_sum(all, sky.n, true, x, [&](int k, float light, size_t voxel) RINGLET_ALWAYS { to(k, voxel) += light; });
+    }
 }
 
 /// Writes minus the gradient of the smoothed hair to entries 4, 5, 6 of the records.
