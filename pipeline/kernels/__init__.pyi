@@ -654,20 +654,24 @@ def body_density(
     """
 
 def surroundings(
-    hair: _F32, body: _F32 | None, spacing: float, loss: _F32, directions: _F32, weights: _F32
+    hair: _F32, body: _F32 | None, spacing: float, loss: _F32, directions: _F32, answers: _F32
 ) -> tuple[_F32, _F32]:
     """What a point sees of the sky, and which way is out of the hair, on a grid of half the resolution.
 
     Args:
         hair: (nx, ny, nz) float32 [1/m], density without direction; even extents.
-        body: (nx, ny, nz) float32 [1/m]; None: there is none.
-        spacing: [m].
+        body: (nx/2, ny/2, nz/2) float32 [1/m], on voxels twice as large; None: there is none.
+        spacing: [m], of the hair's voxels.
         loss: (3,) float32, part of the light that one fibre takes away, for R, G, B.
         directions: (D, 3) float32, evenly spread unit vectors.
-        weights: (D, 3) float32, what hair answers to light from there, for R, G, B: of mean 1.
+        answers: (D, 17) float32, how hair answers to light from there as the eye sees it. 0-2: the mean over fibres of all
+            directions, R, G, B, of mean 1; 3-11: its gradient [1/m] along x, y, z for R, for G, for B, as the eye's
+            direction turns from the grid's middle on; 12-16: m (h h - 1/3), xx, yy, xy, xz, yz, where a fibre of tangent t
+            answers by m P2(t . h) more in green, h between the directions of light and eye.
 
     Returns:
-        (nx/2, ny/2, nz/2, 8) float32: weighted mean transmittance R, G, B, 0, outward normal x, y, z (not normalised), 0;
+        (nx/2, ny/2, nz/2, 16) float32: transmittance as hair answers, R, G, B, 0, outward normal x, y, z (not normalised),
+        0, mean of m (h h - 1/3) as much as comes through, xx, yy, xy, xz, yz, 0, 0, 0;
         (nx/2, ny/2, nz/2, 4) float32: mean transmittance R, G, B, 0.
 
     """
@@ -790,7 +794,7 @@ class Illumination:
             irradiance: (L, 3) float32 [W/m^2], R, G, B on a surface that faces the light.
             sky: (3,) float32, radiance of the constant sky.
             shadows: finished, of the same directions.
-            surroundings: (nx/2, ny/2, nz/2, 8) float32, what hair sees of the sky: see `surroundings`.
+            surroundings: (nx/2, ny/2, nz/2, 16) float32, what hair sees of the sky: see `surroundings`.
             everywhere: (nx/2, ny/2, nz/2, 4) float32, what the head does.
 
         """

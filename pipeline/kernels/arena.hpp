@@ -26,6 +26,31 @@ template <class T> struct Span {
     T &operator[](size_t i) const { return data[i]; }
 };
 
+/// Memory in large pages where the system has them; not set to anything.
+class LargeBlock {
+  public:
+    static constexpr size_t kPage = size_t(1) << 21;
+
+    LargeBlock() = default;
+    explicit LargeBlock(size_t bytes) : size_((bytes + kPage - 1) / kPage * kPage) {
+        bytes_.reset(static_cast<std::byte *>(::operator new(size_, std::align_val_t(kPage))));
+#ifdef __linux__
+        madvise(bytes_.get(), size_, MADV_HUGEPAGE);
+#endif
+    }
+
+    std::byte *data() const { return bytes_.get(); }
+    size_t size() const { return size_; }
+
+  private:
+    struct Free {
+        void operator()(std::byte *block) const { ::operator delete(block, std::align_val_t(kPage)); }
+    };
+
+    std::unique_ptr<std::byte, Free> bytes_;
+    size_t size_ = 0;
+};
+
 class Arena {
   public:
     /// Copies an array; may be called from many threads.
@@ -40,18 +65,10 @@ class Arena {
     void clear() { used_ = 0, left_ = 0; }
 
   private:
-    static constexpr size_t kPage = size_t(1) << 21, kBlock = 4 * kPage, kAlign = 64;
-
-    struct Free {
-        void operator()(std::byte *block) const { ::operator delete(block, std::align_val_t(kPage)); }
-    };
-    struct Block {
-        std::unique_ptr<std::byte, Free> bytes;
-        size_t size;
-    };
+    static constexpr size_t kBlock = 4 * LargeBlock::kPage, kAlign = 64;
 
     std::mutex mutex_;
-    std::vector<Block> blocks_;
+    std::vector<LargeBlock> blocks_;
     size_t used_ = 0; // blocks
     std::byte *next_ = nullptr;
     size_t left_ = 0; // [bytes] of the block in use
@@ -60,20 +77,12 @@ class Arena {
         bytes = (bytes + kAlign - 1) / kAlign * kAlign;
         const std::lock_guard lock(mutex_);
         while (bytes > left_) {
-            if (used_ == blocks_.size()) allocate(std::max(kBlock, (bytes + kPage - 1) / kPage * kPage));
-            next_ = blocks_[used_].bytes.get(), left_ = blocks_[used_].size, ++used_;
+            if (used_ == blocks_.size()) blocks_.emplace_back(std::max(kBlock, bytes));
+            next_ = blocks_[used_].data(), left_ = blocks_[used_].size(), ++used_;
         }
         void *taken = next_;
         next_ += bytes, left_ -= bytes;
         return taken;
-    }
-
-    void allocate(size_t size) {
-        std::unique_ptr<std::byte, Free> bytes(static_cast<std::byte *>(::operator new(size, std::align_val_t(kPage))));
-#ifdef __linux__
-        madvise(bytes.get(), size, MADV_HUGEPAGE);
-#endif
-        blocks_.push_back({std::move(bytes), size});
     }
 };
 

@@ -98,37 +98,40 @@ static nb::ndarray<nb::numpy, float> body(const DistanceField &field, Array<cons
     return values;
 }
 
-static void check_weights(const Vectors &weights) {
+static_assert(sizeof(Answer) == 17 * sizeof(float));
+
+/// One answer for each direction, of mean 1 in each channel.
+static void check_answers(const Array<const float, -1, 17> &answers, size_t directions) {
+    require(answers.shape(0) == directions, "surroundings: answers do not fit directions");
     for (int c = 0; c < 3; ++c) {
         double sum = 0;
-        for (size_t i = 0; i < weights.shape(0); ++i) {
-            const float weight = weights.data()[3 * i + c];
-            require(weight >= 0, "surroundings: expected weights of 0 or more");
-            sum += weight;
+        for (size_t i = 0; i < directions; ++i) {
+            const float answer = answers.data()[17 * i + c];
+            require(answer >= 0, "surroundings: expected answers of 0 or more");
+            sum += answer;
         }
-        require(std::abs(sum - double(weights.shape(0))) < 1e-4 * double(weights.shape(0)), "surroundings: expected weights of mean 1");
+        require(std::abs(sum - double(directions)) < 1e-4 * double(directions), "surroundings: expected answers of mean 1");
     }
 }
 
 static nb::tuple surroundings(Volume hair, std::optional<Volume> body, double spacing, Floats1 loss, Vectors directions,
-                              Array<const float, -1, 3> weights) {
+                              Array<const float, -1, 17> answers) {
     int n[3];
     for (int axis = 0; axis < 3; ++axis) {
-        require(!body || hair.shape(axis) == body->shape(axis), "surroundings: hair and body differ in shape");
+        require(!body || hair.shape(axis) == 2 * body->shape(axis), "surroundings: expected a body of half as many voxels");
         require(hair.shape(axis) % 2 == 0 && hair.shape(axis) >= 4, "surroundings: expected even extents, 4 or more");
         n[axis] = int(hair.shape(axis));
     }
     require(spacing > 0, "surroundings: expected a positive spacing");
     check_directions(directions, "surroundings: expected unit directions");
-    require(weights.shape(0) == directions.shape(0), "surroundings: weights do not fit directions");
-    check_weights(weights);
-    auto records = new_array<float>({size_t(n[0] / 2), size_t(n[1] / 2), size_t(n[2] / 2), size_t(8)});
+    check_answers(answers, directions.shape(0));
+    auto records = new_array<float>({size_t(n[0] / 2), size_t(n[1] / 2), size_t(n[2] / 2), size_t(16)});
     auto open = new_array<float>({size_t(n[0] / 2), size_t(n[1] / 2), size_t(n[2] / 2), size_t(4)});
     float *out = records.data(), *plain = open.data();
     {
     nb::gil_scoped_release release;
-    Sky sky{halve(hair.data(), n, threads()), body ? halve(body->data(), n, threads()) : std::vector<float>(),
-            {n[0] / 2, n[1] / 2, n[2] / 2}, 2 * spacing, loss.data(), directions.data(), weights.data(), int(directions.shape(0))};
+    Sky sky{halve(hair.data(), n, threads()), body ? body->data() : nullptr, {n[0] / 2, n[1] / 2, n[2] / 2}, 2 * spacing, loss.data(),
+            directions.data(), reinterpret_cast<const Answer *>(answers.data()), int(directions.shape(0))};
     write_transmittance(sky, out, plain, threads());
     add_normals(sky, out, threads());
     }
@@ -146,7 +149,7 @@ void bind_density(nb::module_ &m) {
     m.def("optical_depth", &optical_depth, nb::arg("density"), nb::arg("spacing"), nb::arg("directions"));
     m.def("body_density", &body, nb::arg("field"), nb::arg("pose"), nb::arg("shape"), nb::arg("origin"), nb::arg("spacing"));
     m.def("surroundings", &surroundings, nb::arg("hair"), nb::arg("body").none(), nb::arg("spacing"), nb::arg("loss"),
-          nb::arg("directions"), nb::arg("weights"));
+          nb::arg("directions"), nb::arg("answers"));
 }
 
 } // namespace ringlet

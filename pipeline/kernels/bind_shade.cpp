@@ -50,13 +50,13 @@ static void make_tables(HeldTables *held, Records lobes, Array<const float, -1, 
 struct HeldLight : Illumination {
     Triples direction_array, irradiance_array;
     Triple sky_array;
-    Records surrounding_array;
+    Array<const float, -1, -1, -1, 16> surrounding_array;
     Array<const float, -1, -1, -1, 4> open_array;
     std::shared_ptr<Shadows> held_shadows;
 };
 
 static void make_light(HeldLight *held, Triples directions, Triples irradiance, Triple sky, std::shared_ptr<Shadows> shadows,
-                       Records surroundings, Array<const float, -1, -1, -1, 4> open) {
+                       Array<const float, -1, -1, -1, 16> surroundings, Array<const float, -1, -1, -1, 4> open) {
     Illumination light{};
     light.lights = int(directions.shape(0));
     require(irradiance.shape(0) == directions.shape(0), "Illumination: irradiance does not fit directions");

@@ -13,7 +13,7 @@ struct Illumination {
     const float *directions;             // (L, 3) unit vectors towards the lights
     const float *irradiance;             // (L, 3) R, G, B on a surface that faces the light
     const float *sky;                    // (3,) radiance
-    const float *surroundings;           // (nx/2, ny/2, nz/2, 8): transmittance R, G, B to hair, 0, outward normal, 0
+    const float *surroundings;           // (nx/2, ny/2, nz/2, 16): as `surroundings` writes them
     const float *open;                   // (nx/2, ny/2, nz/2, 4): transmittance R, G, B, 0
     int n[3]; // voxels of the density grid
     const Shadows *shadows; // a map for each light
@@ -41,14 +41,20 @@ RINGLET_INLINE Vec3<float> from_centre(const Illumination &light, Vec3<float> x)
     return {x.x - float(c[0]), x.y - float(c[1]), x.z - float(c[2])};
 }
 
-/// Entries of `surroundings` (Eight) or `open` (Four): on voxels twice as large.
-template <class Record>
-RINGLET_INLINE void read_sky(const Illumination &light, const float *table, Vec3<float> g, Floats *entries) {
-    constexpr size_t size = sizeof(Record) / 4;
-    const int n[3] = {light.n[0] / 2, light.n[1] / 2, light.n[2] / 2};
-    const Place x(0.5f * g.x - 0.25f, n[0]), y(0.5f * g.y - 0.25f, n[1]), z(0.5f * g.z - 0.25f, n[2]);
-    const size_t row = size * n[2], stride[3] = {row * n[1], row, size};
-    read<Record>(table, x, y, z, stride, entries);
-}
+/// Where a point (in voxels) lies in tables on voxels twice as large.
+struct SkyPlace {
+    Place x, y, z;
+    size_t across[2]; // voxels along y and z
+
+    RINGLET_INLINE SkyPlace(const Illumination &light, const Vec3<float> &g)
+        : x(0.5f * g.x - 0.25f, light.n[0] / 2), y(0.5f * g.y - 0.25f, light.n[1] / 2), z(0.5f * g.z - 0.25f, light.n[2] / 2),
+          across{size_t(light.n[1] / 2), size_t(light.n[2] / 2)} {}
+
+    /// The first entries of the records of a table, each of `size` floats.
+    template <class Record> RINGLET_INLINE void read(const float *table, size_t size, Floats *entries) const {
+        const size_t row = size * across[1], stride[3] = {row * across[0], row, size};
+        ringlet::read<Record>(table, x, y, z, stride, entries);
+    }
+};
 
 } // namespace ringlet

@@ -160,9 +160,9 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     p.tangent = unit(p.tangent);
     p.to_eye = unit({float(eye[0]) - x.x, float(eye[1]) - x.y, float(eye[2]) - x.z});
     p.at = from_centre(light, x) + splat(light.lights ? kBefore * light.shadows->maps[0].spacing : 0.0f) * p.to_eye;
-    // The sky's voxels are twice as large and hide a strand by its own hair: it is looked up before it. At 3 voxels what hair
-    // answers of the sky is that of exact rays within 8 % on four grooms of five, 13-28 % more on a sleek bob (docs/shading.md)
-    p.x = in_voxels(light, x) + splat(3.0f) * p.to_eye;
+    // The sky's voxels are twice as large: what is seen of one lies half of it before its mean. Right for five grooms in three
+    // colours within 11 % (docs/shading.md)
+    p.x = in_voxels(light, x) + p.to_eye;
     p.sine = clamp(dot(p.tangent, p.to_eye), -1, 1);
     p.cosine = square_root<float>(maximum<float>(1.0f - p.sine * p.sine, splat(1e-6f)));
     p.theta = 0.5f * kPi - arc_cosine(p.sine);
@@ -250,13 +250,26 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     }
 }
 
+/// How much more of the sky than a mean fibre one of this tangent answers: 3/2 t (M - tr M / 3) t; of M xx, yy, xy, xz, yz.
+RINGLET_INLINE Floats mirrors(const Vec3<float> &t, const Floats M[5]) {
+    const Floats diagonal = M[0] * (t.x * t.x - t.z * t.z) + M[1] * (t.y * t.y - t.z * t.z);
+    return 1.5f * (diagonal + 2.0f * (M[2] * t.x * t.y + M[3] * t.x * t.z + M[4] * t.y * t.z));
+}
+
 /// Light of 16 points from everywhere.
 inline void light_block(FibrePoints &p, const Illumination &light, const FibreTables &tables, Floats radiance[3]) {
-    Floats around[8];
-    read_sky<Eight>(light, light.surroundings, p.x, around);
+    Floats around[8], mirrored[8];
+    const SkyPlace place(light, p.x);
+    place.read<Eight>(light.surroundings, 16, around);
+    place.read<Eight>(light.surroundings + 8, 16, mirrored);
     const Vec3<float> out{around[4], around[5], around[6]};
     const Vec3<float> normal = (1.0f / square_root<float>(dot(out, out) + 1e-20f)) * out;
-    for (int c = 0; c < 3; ++c) radiance[c] = light.sky[c] * p.albedo[c] * (p.layers[c].ratio + (1.0f - p.layers[c].ratio) * around[c]);
+    const Floats own = mirrors(p.tangent, mirrored) / maximum<float>(around[1], splat(1e-6f));
+    const Floats times = clamp(1.0f + own, 0, 4);
+    for (int c = 0; c < 3; ++c) {
+        const Floats open = minimum<float>(around[c] * times, splat(1.0f)), r = p.layers[c].ratio;
+        radiance[c] = light.sky[c] * p.albedo[c] * (r + (1.0f - r) * open);
+    }
     for (int l = 0; l < light.lights; ++l) {
         if (p.exact) p.lit = light.shadows->blockers[l].lit(light.shadows->maps[l], p.around);
         add_light(p, light, l, tables, normal, radiance);

@@ -76,48 +76,86 @@ struct SweptVoxels {
     }
 };
 
-/// Sweeps some densities of the same shape along a unit direction: visit(at, tau) for every 16 voxels of a row, `at` their
-/// place in rows across z if that is dominant, in those across x and y if not. Those beyond a row's end mean nothing.
-template <int count, class Visit>
-void sweep(const SweptVoxels *const (&voxels)[count], double spacing, const float direction[3], Visit &&visit) {
-    const int a = dominant(direction), b = a == 0 ? 1 : 0, c = a == 2 ? 1 : 2;
-    const Rows rows(voxels[0]->n, a == 2);
-    const int *n = rows.n;
-    const double along = std::abs(double(direction[a]));
-    const Shift shift[2] = {Shift(direction[b] / along), Shift(direction[c] / along)};
-    const float u = shift[0].weight, v = shift[1].weight, half_step = float(spacing / along / 2);
+/// 16 voxels of a row while they are swept.
+struct SweptPlace {
+    size_t at;              // in rows across z if the direction goes along z most, in those across x and y if not
+    int slice, line, first; // along the dominant axis, the next one and the last: of the first voxel
+
+    operator size_t() const { return at; }
+};
+
+/// Some densities of the same shape on the way along a unit direction, slice by slice from the light on.
+template <int count> class Sweep {
+    static constexpr size_t kPad = 16;
+
+    const SweptVoxels *voxels[count];
+    int a, b, c; // axes: the dominant one, that of rows, that along them
+    Rows rows;
+    bool down; // the light is where the numbers of slices are largest
+    Shift shift[2];
+    float half_step;
     // tau + ds/2 rho of the slice before and of this one, within zeros
-    constexpr size_t pad = 16;
-    const size_t row = rows.length + 2 * pad;
+    size_t row;
     std::vector<float> before[count], here[count];
-    for (int k = 0; k < count; ++k) before[k].resize((n[b] + 2) * row), here[k].resize((n[b] + 2) * row);
     Floats lane;
-    for (int k = 0; k < 16; ++k) lane[k] = float(k);
-    const auto read = [](const float *from) RINGLET_ALWAYS {
+
+    RINGLET_INLINE static Floats read(const float *from) {
         Floats lanes;
         __builtin_memcpy(&lanes, from, sizeof lanes);
         return lanes;
-    };
-    for (int slice = 0; slice < n[a]; ++slice) {
-        const size_t first = rows.stride(a) * (direction[a] > 0 ? n[a] - 1 - slice : slice);
-        for (int i = 0; i < n[b]; ++i)
-            for (size_t j = 0; j < rows.length; j += 16) {
-                const size_t at = first + rows.stride(b) * i + j, to = (i + 1) * row + pad + j;
-                const size_t low = to + shift[0].low * ptrdiff_t(row) + shift[1].low, high = low + row;
-                const Ints valid = lane < float(n[c] - int(j));
+    }
+
+  public:
+    Sweep(const SweptVoxels *const (&swept)[count], double spacing, const float direction[3])
+        : a(dominant(direction)), b(a == 0 ? 1 : 0), c(a == 2 ? 1 : 2), rows(swept[0]->n, a == 2), down(direction[a] > 0),
+          shift{Shift(direction[b] / std::abs(double(direction[a]))), Shift(direction[c] / std::abs(double(direction[a])))},
+          half_step(float(spacing / std::abs(double(direction[a])) / 2)), row(rows.length + 2 * kPad) {
+        for (int k = 0; k < count; ++k) {
+            voxels[k] = swept[k];
+            before[k].resize((rows.n[b] + 2) * row), here[k].resize((rows.n[b] + 2) * row);
+        }
+        for (int k = 0; k < 16; ++k) lane[k] = float(k);
+    }
+
+    int slices() const { return rows.n[a]; }
+    int lines() const { return rows.n[b]; }
+    size_t length() const { return rows.length; }
+
+    /// 16 voxels of the k-th slice, from voxel j of a line on: of all of them, before `next`.
+    RINGLET_INLINE SweptPlace step(int k, int line, size_t j, Floats (&tau)[count]) {
+        const int number = down ? slices() - 1 - k : k;
+        const size_t at = rows.stride(a) * number + rows.stride(b) * line + j, to = (line + 1) * row + kPad + j;
+        const size_t low = to + shift[0].low * ptrdiff_t(row) + shift[1].low, high = low + row;
+        const float u = shift[0].weight, v = shift[1].weight;
+        const Ints valid = lane < float(rows.n[c] - int(j));
+        for (int q = 0; q < count; ++q) {
+            const float *from = before[q].data();
+            const Floats own = half_step * read(voxels[q]->rows[a == 2].data() + at);
+            tau[q] = (1 - u) * ((1 - v) * read(from + low) + v * read(from + low + 1)) +
+                     u * ((1 - v) * read(from + high) + v * read(from + high + 1)) + own;
+            const Floats after = valid ? tau[q] + own : splat(0.0f);
+            __builtin_memcpy(here[q].data() + to, &after, sizeof after);
+        }
+        return {at, number, line, int(j)};
+    }
+
+    /// After the last of a slice.
+    void next() {
+        for (int q = 0; q < count; ++q) std::swap(before[q], here[q]);
+    }
+};
+
+/// Sweeps all slices: visit(place, tau) for every 16 voxels of a row. Those beyond a row's end mean nothing.
+template <int count, class Visit>
+void sweep(const SweptVoxels *const (&voxels)[count], double spacing, const float direction[3], Visit &&visit) {
+    Sweep<count> own(voxels, spacing, direction);
+    for (int k = 0; k < own.slices(); ++k, own.next())
+        for (int line = 0; line < own.lines(); ++line)
+            for (size_t j = 0; j < own.length(); j += 16) {
                 Floats tau[count];
-                for (int k = 0; k < count; ++k) {
-                    const float *from = before[k].data();
-                    const Floats own = half_step * read(voxels[k]->rows[a == 2].data() + at);
-                    tau[k] = (1 - u) * ((1 - v) * read(from + low) + v * read(from + low + 1)) +
-                             u * ((1 - v) * read(from + high) + v * read(from + high + 1)) + own;
-                    const Floats after = valid ? tau[k] + own : splat(0.0f);
-                    __builtin_memcpy(here[k].data() + to, &after, sizeof after);
-                }
+                const SweptPlace at = own.step(k, line, j, tau);
                 visit(at, tau);
             }
-        for (int k = 0; k < count; ++k) std::swap(before[k], here[k]);
-    }
 }
 
 } // namespace ringlet

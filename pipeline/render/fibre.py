@@ -33,7 +33,7 @@ ABSORPTION_MAX: Final = 8.0
 """[1/radius] absorption at the last level: darker hair shows only its R lobe, as this does."""
 LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 52, 48, 140
 _DIRECTIONS: Final = 64
-_INCLINED, _AROUND = 8, 24  # fibres and azimuths of the mean answer to light from a direction
+_INCLINED, _AROUND = 16, 24  # fibres and azimuths of the mean answer to light from a direction
 _GREY: Final = 0.9999
 """Albedo of the whitest hair when the slant is looked for: in white hair nothing fades, aslant or not."""
 
@@ -215,15 +215,19 @@ class Scattering:
         a_f, a_b = (np.interp(np.sqrt(sigma), np.sqrt(self.levels), self.sums[:, 0, i]) for i in range(2))
         return np.sqrt(np.maximum((1 - a_f) ** 2 - a_b**2, 0)).astype(np.float32)
 
-    def answer(self, cosine: _F64, sigma: _F64) -> _F64:
-        """Radiance (D, 3) towards the eye by irradiance from a direction: the mean over fibres of all directions.
+    def answer(self, cosine: _F64, sigma: _F64) -> tuple[_F64, _F64]:
+        """How fibres answer to light from directions around the eye's: w (D, 3), R, G, B, and m (D,), green.
+
+        A fibre of tangent t answers w + m P2(t . h), by what it does under an even sky, to light from a direction with the
+        half vector h to the eye's. Fibres mirror light to the cone around them, where t . h = 0: for the sharpest of lobes
+        m = -5/2 w, the second of Legendre's series of a delta.
 
         Args:
             cosine: (D,) of the angle between the direction that light comes from and that to the eye.
             sigma: (3,) [1/radius] absorption.
 
-        Each fibre counts as wide as the eye sees it. The tilt of its scales, which fibres of opposite directions turn to
-        opposite sides, is left out.
+        Fibres of all directions count alike. The tilt of their scales, which those of opposite directions turn to opposite
+        sides, is left out.
 
         """
         sine, weight = (each[:, None, None] for each in np.polynomial.legendre.leggauss(_INCLINED))
@@ -238,13 +242,20 @@ class Scattering:
         theta, azimuth = np.arccos(out) * ((INCLINATIONS - 1) * 2 / np.pi), phi * ((AZIMUTHS - 1) / np.pi)
         level = np.sqrt(np.minimum(sigma / ABSORPTION_MAX, 1)) * (LEVELS - 1)
         below = np.minimum(level.astype(int), LEVELS - 2)
-        sums = np.zeros((3, cosine.size))
+        answers = np.zeros((3, *phi.shape))
         for lobe, v in zip(self.far_field[0], variances(self.roughness), strict=True):
-            seen = weight * out * _along(across * out, arriving * sine, v)
+            seen = _along(across * out, arriving * sine, v)
             for c, (k, u) in enumerate(zip(below, level - below, strict=True)):
                 of_level = (1 - u) * lobe[k] + u * lobe[k + 1]
-                sums[c] += (seen * _between(of_level, theta, azimuth)).sum(axis=(0, 2))
-        return np.asarray(sums.T / (_AROUND * (weight * out).sum()))
+                answers[c] += seen * _between(of_level, theta, azimuth)
+        albedo = self.sums[..., 0] + self.sums[..., 1]
+        for c, (k, u) in enumerate(zip(below, level - below, strict=True)):
+            of_level = (1 - u) * albedo[k] + u * albedo[k + 1]
+            answers[c] *= 4 * np.pi / np.interp(theta, np.arange(INCLINATIONS), of_level)
+        answers *= weight / (2 * _AROUND)
+        half = (arriving + sine) / np.sqrt(np.maximum(2 + 2 * cosine, 1e-6))[:, None]
+        second = 5 * answers[1] * (1.5 * np.minimum(half**2, 1) - 0.5)
+        return answers.sum(axis=(1, 3)).T, second.sum(axis=(0, 2))
 
     def tables(self, pigment: _F32) -> kernels.FibreTables:
         """The tables as the shading kernel takes them, with a `pipeline.render.pigment.table` (K, J, 4)."""

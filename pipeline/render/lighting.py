@@ -16,6 +16,7 @@ from pipeline import kernels
 from pipeline.config.schema import Fibre, Scene
 from pipeline.render import fibre, pigment
 from pipeline.render.lights import as_directions
+from pipeline.render.sky import Sky
 from pipeline.render.veil import Veil
 from pipeline.strands.random import uniform
 
@@ -31,20 +32,8 @@ _CASTERS: Final = 200_000
 _CASTER: Final = 41  # salt
 _PIECES: Final = 400_000
 """Points, and lengths of eight widths, of strands up to which it is told which of them light meets."""
-_SKY_DIRECTIONS: Final = 26
-_ANSWERS: Final = 65
-"""Cosines for which it is known what hair answers to light from there."""
 _OPAQUE: Final = 4
 """Times that the head is denser for the eye than for light: two voxels of it hide everything."""
-
-
-def _evenly_spread(count: int) -> _F32:
-    """Unit directions (count, 3) on a Fibonacci spiral."""
-    i = np.arange(count) + 0.5
-    z = 1 - 2 * i / count
-    turn = i * np.pi * (3 - np.sqrt(5))
-    r = np.sqrt(1 - z**2)
-    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).astype(np.float32)
 
 
 def pieces(points: int, length: float, width: float) -> float:
@@ -71,6 +60,8 @@ class _Shadowed:
     """(nx, ny, nz) [1/m]: strands per length of a ray."""
     body: _F32 | None
     """(nx, ny, nz) [1/m]: the head as an almost opaque solid; None where there is none."""
+    coarse: _F32 | None
+    """(nx/2, ny/2, nz/2) [1/m]: the same on the sky's voxels."""
 
 
 class Lighting:
@@ -85,10 +76,8 @@ class Lighting:
         scattering = fibre.Scattering(hair.roughness, hair.azimuthal_roughness, hair.tilt, hair.reciprocal)
         colours = pigment.table(hair)
         self._tables = scattering.tables(colours)
-        self._around = _evenly_spread(_SKY_DIRECTIONS)
         middle = colours[:, colours.shape[1] // 2, :3]
-        self._cosines = np.linspace(-1, 1, _ANSWERS)
-        self._answer = scattering.answer(self._cosines, middle.mean(axis=0, dtype=np.float64))
+        self._around = Sky(scattering, middle.mean(axis=0, dtype=np.float64))
         # Light that comes from everywhere has passed all of the strands
         self._loss = scattering.loss(middle).mean(axis=0, dtype=np.float64).astype(np.float32)
         self._grid: kernels.DensityGrid | None = None
@@ -146,13 +135,15 @@ class Lighting:
         grid = self._started()
         origin = np.array(grid.origin)
         density = grid.density()
-        body = None
+        body = coarse = None
         if head is not None:
+            nx, ny, nz = grid.shape
             body = kernels.body_density(head, pose, grid.shape, origin, grid.spacing)
+            coarse = kernels.body_density(head, pose, (nx // 2, ny // 2, nz // 2), origin, 2 * grid.spacing)
         # A fibre seen from all sides shows pi / 4 of its length * width
         hair = density * np.float32(np.pi / 4)
         self._shadows.finish(hair, origin, grid.spacing, head, pose)
-        self._frame = _Shadowed(origin, grid.spacing, head, pose, hair, body)
+        self._frame = _Shadowed(origin, grid.spacing, head, pose, hair, body, coarse)
         self._grid = None
 
     def veil(self, eye: _F64, wider: float) -> Veil:
@@ -196,12 +187,10 @@ class Lighting:
             return self._seen[1]
         frame, shadows = self._finished(), self._shadows
         assert shadows is not None
-        toward = eye - (frame.origin + frame.spacing * np.array(frame.hair.shape) / 2)
-        cosines = self._around @ (toward / max(float(np.linalg.norm(toward)), 1e-9))
-        answer = np.stack([np.interp(cosines, self._cosines, each) for each in self._answer.T], axis=-1)
-        weights = (answer / answer.mean(axis=0)).astype(np.float32)
+        sides = frame.spacing * np.array(frame.hair.shape)
+        answers = self._around.answers(eye - (frame.origin + sides / 2), float(np.linalg.norm(sides)))
         sky, everywhere = kernels.surroundings(
-            frame.hair, frame.body, frame.spacing, self._loss, self._around, weights
+            frame.hair, frame.coarse, frame.spacing, self._loss, self._around.directions, answers
         )
         light = kernels.Illumination(self._directions, self._irradiance, self._sky, shadows, sky, everywhere)
         x, y, z = (float(each) for each in frame.origin)

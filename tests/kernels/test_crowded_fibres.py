@@ -70,7 +70,8 @@ def ours(to_light: _F64, tables: kernels.FibreTables) -> float:
     shadows.begin(LOW, HIGH, SPACING, 2 * RADIUS)
     shadows.add(strands, np.full(strands.shape[:2], 2 * RADIUS, np.float32))
     shadows.finish(np.zeros((4, 4, 4), np.float32), LOW, 0.02, None, np.eye(4))
-    around = np.ones((2, 2, 2, 8), np.float32)
+    around = np.zeros((2, 2, 2, 16), np.float32)
+    around[..., :8] = 1
     everywhere, none = np.ones((2, 2, 2, 4), np.float32), np.zeros(3, np.float32)
     light = kernels.Illumination(L, np.ones((1, 3), np.float32), none, shadows, around, everywhere)
     light.glints = False

@@ -166,15 +166,17 @@ def test_surroundings_of_nothing_see_the_whole_sky_and_normals_point_out_of_the_
     n = 32
     directions = np.concatenate([np.eye(3), -np.eye(3)]).astype(np.float32)
     loss = np.array([0.0, 0.3, 0.9], np.float32)
-    empty, weights = np.zeros((n, n, n), np.float32), np.ones((6, 3), np.float32)
-    lopsided = 6 * (directions[:, :1] > 0) * weights
-    for weight in (weights, lopsided):
-        for open_sky in kernels.surroundings(empty, empty, 1e-3, loss, directions, weight):
+    empty, body = np.zeros((n, n, n), np.float32), np.zeros((n // 2, n // 2, n // 2), np.float32)
+    even, lopsided = np.zeros((2, 6, 17), np.float32)
+    even[:, :3], lopsided[:, :3] = 1, 6 * (directions[:, :1] > 0)
+    for answers in (even, lopsided):
+        for open_sky in kernels.surroundings(empty, body, 1e-3, loss, directions, answers):
             assert np.abs(open_sky[..., :3] - 1).max() < 1e-6
     hair = empty.copy()
     hair[8:24, 8:24, 8:24] = 500
-    sky, even = kernels.surroundings(hair, empty, 1e-3, loss, directions, weights)
-    assert np.array_equal(sky[..., :3], even[..., :3])
+    sky, plain = kernels.surroundings(hair, body, 1e-3, loss, directions, even)
+    assert np.array_equal(sky[..., :3], plain[..., :3])
+    assert not sky[..., 8:].any()
     # No loss, no shadow; more loss, more shadow
     assert np.abs(sky[..., 0] - 1).max() < 1e-6
     inside = sky[8, 8, 8]
@@ -183,9 +185,17 @@ def test_surroundings_of_nothing_see_the_whole_sky_and_normals_point_out_of_the_
     assert inside[1] == pytest.approx(expected, rel=0.2)
     assert sky[4, 8, 8, 4] < 0 < sky[11, 8, 8, 4]
     # Where hair answers only to light that comes along x, what lies there counts alone
-    from_x, _ = kernels.surroundings(hair, empty, 1e-3, loss, directions, lopsided)
+    from_x, _ = kernels.surroundings(hair, body, 1e-3, loss, directions, lopsided)
     assert from_x[13, 8, 8, 1] == pytest.approx(1, abs=1e-6)
     assert from_x[2, 8, 8, 1] < 0.1 < sky[2, 8, 8, 1]
+    # Answers that turn across the grid do so from its middle on; what fibres mirror is summed as it comes through
+    turned = even.copy()
+    turned[0, 6], turned[:, 12:] = 100, [1, -1, 0.5, -0.5, 0.25]
+    across, _ = kernels.surroundings(hair, None, 1e-3, loss, directions, turned)
+    for x in (0, 15):
+        more = 100 * (x - 7.5) * 2e-3 / 6 * (from_x if x else plain)[x, 0, 0, 1]
+        assert across[x, 0, 0, 1] - plain[x, 0, 0, 1] == pytest.approx(more, abs=1e-6)
+    assert np.abs(across[..., 8:13] - plain[..., 1:2] * [1, -1, 0.5, -0.5, 0.25]).max() < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,8 @@ def shader(colours: F32) -> kernels.FibreShader:
     tables = kernels.FibreTables(
         np.zeros((2, 2, 2, 8), np.float32), sums, own_colours(colours[:, 0] ** 2)[0], flat, 0 * flat, 1.0
     )
-    none, around = np.zeros((0, 3), np.float32), np.ones((2, 2, 2, 8), np.float32)
+    none, around = np.zeros((0, 3), np.float32), np.zeros((2, 2, 2, 16), np.float32)
+    around[..., :8] = 1
     everywhere = np.ones((2, 2, 2, 4), np.float32)
     sky = np.ones(3, np.float32)
     light = kernels.Illumination(none, none, sky, kernels.Shadows(none), around, everywhere)

@@ -41,7 +41,7 @@ class Room:
             # Far behind the first strand no ray to the eye shares strands with the one to the light
             surface[..., 0], surface[..., 1] = -1e6, self.n + self.behind
             layers[...], solid[...] = np.float16(32 * self.n).view(np.uint16), -1e9 if self.dark else 1e9
-        around = np.zeros((n // 2, n // 2, n // 2, 8), np.float32)
+        around = np.zeros((n // 2, n // 2, n // 2, 16), np.float32)
         around[..., :3], around[..., 4:7] = 1, self.normal
         light = kernels.Illumination(
             directions.astype(np.float32),
