@@ -32,6 +32,7 @@ ETA: Final = 1.55
 ABSORPTION_MAX: Final = 8.0
 """[1/radius] absorption at the last level: darker hair shows only its R lobe, as this does."""
 LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 52, 48, 140
+_PLACES: Final = 8  # from the middle of a fibre to its side: see near_field.hpp
 _DIRECTIONS: Final = 64
 _INCLINED, _AROUND = 8, 24  # fibres and azimuths of the mean answer to light from a direction
 _GREY: Final = 0.9999
@@ -246,6 +247,16 @@ class Scattering:
                 sums[c] += (seen * _between(of_level, theta, azimuth)).sum(axis=(0, 2))
         return np.asarray(sums.T / (_AROUND * (weight * out).sum()))
 
+    @cached_property
+    def across(self) -> _F64:
+        """(A, T, 32): mean of A_p over each eighth of the way from the middle to a side, by that over all of it."""
+        nodes, weights = np.polynomial.legendre.leggauss(NODES // _PLACES)
+        cosine = np.cos(np.minimum(np.linspace(0, np.pi / 2, INCLINATIONS), 1.5707))
+        h = (np.arange(_PLACES)[:, None] + (1 + nodes) / 2) / _PLACES
+        leaving = attenuation(cosine[:, None, None], h, self.levels[:, None, None, None]) @ (weights / 2)
+        shares = leaving / np.maximum(leaving.mean(-1, keepdims=True), 1e-300)
+        return np.moveaxis(shares, 0, 2).reshape(LEVELS, INCLINATIONS, -1)
+
     def tables(self, pigment: _F32) -> kernels.FibreTables:
         """The tables as the shading kernel takes them, with a `pipeline.render.pigment.table` (K, J, 4)."""
         lobes, means = self.far_field
@@ -261,4 +272,7 @@ class Scattering:
             ABSORPTION_MAX,
         )
         tables.reciprocal = self.reciprocal
+        tables.vary_across(
+            np.ascontiguousarray(self.across, np.float32), ETA, scale(self.azimuthal_roughness)
+        )
         return tables
