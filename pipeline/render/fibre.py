@@ -255,10 +255,13 @@ class Scattering:
         h = (np.arange(_PLACES)[:, None] + (1 + nodes) / 2) / _PLACES
         leaving = attenuation(cosine[:, None, None], h, self.levels[:, None, None, None]) @ (weights / 2)
         shares = leaving / np.maximum(leaving.mean(-1, keepdims=True), 1e-300)
-        return np.moveaxis(shares, 0, 2).reshape(LEVELS, INCLINATIONS, -1)
+        return np.asarray(np.moveaxis(shares, 0, 2).reshape(LEVELS, INCLINATIONS, -1))
 
-    def tables(self, pigment: _F32) -> kernels.FibreTables:
-        """The tables as the shading kernel takes them, with a `pipeline.render.pigment.table` (K, J, 4)."""
+    def tables(self, pigment: _F32, near: bool = True) -> kernels.FibreTables:
+        """The tables as the shading kernel takes them, with a `pipeline.render.pigment.table` (K, J, 4).
+
+        Without `near`, wide strands show their mean over their width.
+        """
         lobes, means = self.far_field
         record = [*lobes, means[0], means[1], means[2] + means[3], 0 * means[0]]
         # The cuticle's scales lean towards the tip: R turns to the tip, TT and TRT to the root
@@ -272,7 +275,7 @@ class Scattering:
             ABSORPTION_MAX,
         )
         tables.reciprocal = self.reciprocal
-        tables.vary_across(
-            np.ascontiguousarray(self.across, np.float32), ETA, scale(self.azimuthal_roughness)
-        )
+        if near:
+            across = np.ascontiguousarray(self.across, np.float32)
+            tables.vary_across(across, ETA, scale(self.azimuthal_roughness))
         return tables

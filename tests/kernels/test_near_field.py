@@ -60,9 +60,7 @@ def draw(points: _F32, pixels: float, light: kernels.Illumination, side: int, ch
     key = np.zeros(len(points), np.uint32)
     raster = kernels.Raster((side, side), 30.0)
     raster.begin(twin.matrix(side, side), twin.scale(side), (twin.NEAR, twin.FAR))
-    back = kernels.Backdrop(
-        np.ones((side, side), np.float32), np.zeros((side, side, 3), np.uint8), LINEAR, 1
-    )
+    back = kernels.Backdrop(np.ones((side, side), np.float32), np.zeros((side, side, 3), np.uint8), LINEAR, 1)
     raster.count(points, widths, 0)
     raster.cut_off(back)
     shader = kernels.FibreShader(light, tables(), EYE)
