@@ -771,6 +771,17 @@ class FibreTables:
 
         """
 
+    def vary_across(self, across: _F32, eta: float, scale: float) -> None:
+        """Let wide strands show what is seen at places across them; see near_field.hpp.
+
+        Args:
+            across: (A, T, 32) float32, of each lobe the mean of A_p over the eighths of the way from the middle to a
+                side, by the mean over all of it; held and not copied.
+            eta: refractive index.
+            scale: s of the logistic around the fibre.
+
+        """
+
     reciprocal: (
         bool  # False: light that is scattered once takes its lobes at theta_d, not at the eye's theta_o
     )

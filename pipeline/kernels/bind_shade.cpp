@@ -26,6 +26,7 @@ struct HeldTables : FibreTables {
     Records lobe_array;
     Array<const float, -1, -1, 8> sum_array;
     Array<const float, -1, -1, 4> pigment_array;
+    std::optional<Array<const float, -1, -1, 2 * Across::kPlaces>> across_array;
 };
 
 static void make_tables(HeldTables *held, Records lobes, Array<const float, -1, -1, 8> sums, Array<const float, -1, -1, 4> pigment,
@@ -43,7 +44,14 @@ static void make_tables(HeldTables *held, Records lobes, Array<const float, -1, 
         tables.variance[p] = variance.data()[p];
         tables.tilt_cosine[p] = std::cos(tilt.data()[p]), tables.tilt_sine[p] = std::sin(tilt.data()[p]);
     }
-    new (held) HeldTables{tables, lobes, sums, pigment};
+    new (held) HeldTables{tables, lobes, sums, pigment, std::nullopt};
+}
+
+static void vary_across(HeldTables &tables, Array<const float, -1, -1, 2 * Across::kPlaces> across, float eta, float scale) {
+    require(across.shape(0) == size_t(tables.A) && across.shape(1) == size_t(tables.T), "FibreTables: across does not fit lobes");
+    require(eta > 1 && scale > 0, "FibreTables: expected eta > 1 and a positive scale");
+    tables.across_array = across, tables.across = across.data();
+    tables.eta = eta, tables.scale = scale;
 }
 
 /// The light with the arrays that it points into.
@@ -119,6 +127,7 @@ void bind_shade(nb::module_ &m) {
     nb::class_<HeldTables>(m, "FibreTables")
         .def("__init__", &make_tables, nb::arg("lobes"), nb::arg("sums"), nb::arg("pigment"), nb::arg("variance"),
              nb::arg("tilt"), nb::arg("absorption_max"))
+        .def("vary_across", &vary_across, nb::arg("across"), nb::arg("eta"), nb::arg("scale"))
         .def_rw("reciprocal", &HeldTables::reciprocal);
     nb::class_<HeldLight>(m, "Illumination")
         .def("__init__", &make_light, nb::arg("directions"), nb::arg("irradiance"), nb::arg("sky"), nb::arg("shadows"),

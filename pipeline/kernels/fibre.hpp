@@ -26,6 +26,8 @@ struct FibreTables {
     const float *lobes; // (A, T, H, 8): N_R, N_TT, N_TRT, N_rest, G_R, G_TT, G_TRT + G_rest, 0
     const float *sums;  // (A, T, 8): a_f, a_b, s, m, twice the circle means of N for TT, TRT + rest, v_f, v_b; see shade.hpp
     const float *pigment; // (K, J, 4): absorption R, G, B [1/radius], variance over `variance`; from root to tip, and by u
+    const float *across = nullptr; // (A, T, 32): A_p over its mean at 8 places from the middle to the side; null: the mean shows
+    float eta = 1.55f, scale = 0.1f; // refractive index, and of the logistic around the fibre: what `across` is used with
     int A, T, H, K, J;
     float variance[4], absorption_max;
     bool reciprocal = false; // light that is scattered once takes the lobes at theta_d, not at theta_o

@@ -24,6 +24,7 @@ class Painter {
     /// Starts a picture.
     void begin(const Backdrop &back, const PointShader &shader, const Pictures &pictures) {
         shaded = 0, shader_ = &shader, pictures_ = pictures;
+        sides_.clear();
         tile_.over(back, pictures.names);
     }
 
@@ -68,6 +69,7 @@ class Painter {
     std::vector<uint64_t> again_, near_; // entries of mixed pixels, and of a square of them
     std::vector<uint32_t> uncoloured_; // segments that wait for the colours of their points
     std::vector<uint32_t> unshaded_;   // points
+    Sides sides_;
     std::vector<StrandPoint> to_shade_;
     std::vector<float> radiance_;
     Words reached_[kPortion]; // pixels of each entry
@@ -88,6 +90,7 @@ class Painter {
         for (int k = 0; k < kCount; ++k) waiting |= uint32_t(wrong[block * kCount + k] != 0) << k;
         entries_.clear();
         segments_.resize((count + step - 1) / step * step), number_.assign(number, number + count), shaded_.assign(count, 0);
+        sides_.begin(), tile_.with(nullptr);
         for (size_t first = 0; first < count; first += step) {
             const ScreenPoint *begin[step];
             Mask<float> some;
@@ -189,20 +192,11 @@ class Painter {
     /// Shades the points that are wanted, and colours the segments. Another thread may shade the same point beside this
     /// one, to the same bits.
     void shade() {
+        shade_wide();
         for (const uint32_t i : uncoloured_)
             for (uint32_t point = number_[i]; point < number_[i] + 2; ++point)
                 if (!(known(point) & SeenPoint::kKnown)) unshaded_.push_back(point);
-        std::sort(unshaded_.begin(), unshaded_.end());
-        unshaded_.erase(std::unique(unshaded_.begin(), unshaded_.end()), unshaded_.end());
-        to_shade_.clear();
-        for (const uint32_t number : unshaded_) {
-            const Batch &batch = bins_.batch(number);
-            const uint32_t point = bins_.seen(number)->number & ~SeenPoint::kKnown, strand = point / uint32_t(bins_.P);
-            to_shade_.push_back({batch.points.data + size_t(strand) * bins_.P * 3, batch.variation.data + 3 * size_t(strand),
-                                 batch.key[strand], int(point - strand * uint32_t(bins_.P))});
-            __builtin_prefetch(batch.points.data + 3 * size_t(point)), __builtin_prefetch(to_shade_.back().root);
-        }
-        shaded += to_shade_.size();
+        find_unshaded();
         radiance_.resize(3 * to_shade_.size());
         shader_->shade(to_shade_.data(), to_shade_.size(), bins_.P, radiance_.data());
         for (size_t i = 0; i < unshaded_.size(); ++i) {
@@ -218,6 +212,41 @@ class Painter {
             }
         }
         unshaded_.clear(), uncoloured_.clear();
+    }
+
+    /// The same of wide segments, which no longer wait then. Their colours are this painter's alone.
+    void shade_wide() {
+        if (!shader_->varies_across()) return;
+        const auto thin = [&](uint32_t i) { return !shows_sides(segments_[i]); };
+        const auto wide = std::partition(uncoloured_.begin(), uncoloured_.end(), thin);
+        if (wide == uncoloured_.end()) return;
+        for (auto i = wide; i != uncoloured_.end(); ++i)
+            for (uint32_t point = number_[*i]; point < number_[*i] + 2; ++point)
+                if (!sides_.has(point)) unshaded_.push_back(point);
+        find_unshaded();
+        shader_->shade_across(to_shade_.data(), to_shade_.size(), bins_.P, sides_.add(unshaded_));
+        for (auto i = wide; i != uncoloured_.end(); ++i) {
+            Segment &s = segments_[*i];
+            const auto [begin, end] = sides_.join(*i, number_[*i]);
+            for (int c = 0; c < 3; ++c) s.shown[c] = begin->mean[c], s.gain[c] = end->mean[c] - begin->mean[c];
+        }
+        tile_.with(&sides_);
+        unshaded_.clear(), uncoloured_.erase(wide, uncoloured_.end());
+    }
+
+    /// Finds the points that are not shaded yet, each once.
+    void find_unshaded() {
+        std::sort(unshaded_.begin(), unshaded_.end());
+        unshaded_.erase(std::unique(unshaded_.begin(), unshaded_.end()), unshaded_.end());
+        to_shade_.clear();
+        for (const uint32_t number : unshaded_) {
+            const Batch &batch = bins_.batch(number);
+            const uint32_t point = bins_.seen(number)->number & ~SeenPoint::kKnown, strand = point / uint32_t(bins_.P);
+            to_shade_.push_back({batch.points.data + size_t(strand) * bins_.P * 3, batch.variation.data + 3 * size_t(strand),
+                                 batch.key[strand], int(point - strand * uint32_t(bins_.P))});
+            __builtin_prefetch(batch.points.data + 3 * size_t(point)), __builtin_prefetch(to_shade_.back().root);
+        }
+        shaded += to_shade_.size();
     }
 
     uint32_t known(uint32_t point) const { return __atomic_load_n(&bins_.seen(point)->number, __ATOMIC_ACQUIRE); }

@@ -23,11 +23,10 @@
 #pragma once
 
 #include "illumination.hpp"
+#include "near_field.hpp"
 #include "strand_point.hpp"
 
 namespace ringlet {
-
-constexpr float kPi = 3.14159265f;
 
 struct StrandPoints {
     const float *points;     // (S, P, 3)
@@ -199,9 +198,11 @@ RINGLET_INLINE void widened(const FibreTables &tables, Floats rough, Floats spre
     for (int p = 0; p < 3; ++p) M[p] = along(cosines, sines, Lobe(rough * tables.variance[p] + spread));
 }
 
-/// What one light adds. noinline: the compiler keeps the 16 lanes in registers only in functions of this size.
-__attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illumination &light, int l,
-                                                const FibreTables &tables, const Vec3<float> &normal, Floats radiance[3]) {
+/// What one light adds. noinline: the compiler keeps the 16 lanes in registers only in functions of this size. `places`
+/// take what differs across the strands.
+template <class Places>
+__attribute__((noinline)) void add_light(const FibrePoints &p, const Illumination &light, int l, const FibreTables &tables,
+                                         const Vec3<float> &normal, Floats radiance[3], Places &places) {
     const Vec3<float> L = light.direction(l);
     const ShadowMap &map = light.shadows->maps[l];
     const Reach way = reach(map, p.at, 1.0f);
@@ -238,15 +239,19 @@ __attribute__((noinline)) inline void add_light(const FibrePoints &p, const Illu
     const Floats alone = exponential(-before), chance = light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f)) : alone;
     const Floats seen = p.exact ? p.lit : chance;
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
+    places.turn(dot(cross(p.tangent, p.to_eye), L) < 0.0f ? -phi : phi);
     for (int c = 0; c < 3; ++c) {
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
         const Flux flux = two_flux(p.layers[c], way.n, way.behind, through, past);
         const Floats scattered = flux.down, returned = flux.up * facing;
-        Floats sum = seen * (crowns * direct[0] * lobes[0] + direct[1] * lobes[1] + flanks * direct[2] * lobes[2] + direct[3] * lobes[3]);
+        const Floats once = crowns * direct[0] * lobes[0] + direct[1] * lobes[1] + flanks * direct[2] * lobes[2] + direct[3] * lobes[3];
+        Floats sum = seen * once;
         // G(pi - phi) = 2 mean - G(phi): the half circles complete each other
         const Floats *twice = p.layers[c].twice;
         for (int q = 0; q < 3; ++q) sum += scattered * down[q] * lobes[4 + q] + returned * back[q] * (twice[q] - lobes[4 + q]);
-        radiance[c] += light.irradiance[3 * l + c] * way.visible * sum;
+        const Floats lit = light.irradiance[3 * l + c] * way.visible;
+        radiance[c] += lit * sum;
+        places.add(c, lit * seen, direct, lobes, once);
     }
 }
 
@@ -257,7 +262,8 @@ RINGLET_INLINE Floats mirrors(const Vec3<float> &t, const Floats M[5]) {
 }
 
 /// Light of 16 points from everywhere.
-inline void light_block(FibrePoints &p, const Illumination &light, const FibreTables &tables, Floats radiance[3]) {
+template <class Places>
+void light_block(FibrePoints &p, const Illumination &light, const FibreTables &tables, Floats radiance[3], Places &places) {
     Floats around[8], mirrored[8];
     const SkyPlace place(light, p.x);
     place.read<Eight>(light.surroundings, 16, around);
@@ -272,7 +278,7 @@ inline void light_block(FibrePoints &p, const Illumination &light, const FibreTa
     }
     for (int l = 0; l < light.lights; ++l) {
         if (p.exact) p.lit = light.shadows->blockers[l].lit(light.shadows->maps[l], p.around);
-        add_light(p, light, l, tables, normal, radiance);
+        add_light(p, light, l, tables, normal, radiance, places);
     }
 }
 
@@ -286,18 +292,35 @@ struct FibreShader : PointShader {
         : light(light), tables(tables), eye{from[0], from[1], from[2]} {}
 
     /// The points from `first` on, 16 of them; past the last, the last again.
-    template <class Points> void block(const Points &from, size_t first, size_t count, int P, float *radiance) const {
+    template <class Points> FibrePoints read(const Points &from, size_t first, size_t count, int P) const {
         StrandPoint points[16];
         for (size_t i = 0; i < 16; ++i) points[i] = from[std::min(first + i, count - 1)];
-        FibrePoints p = gather(points, P, eye, light, tables);
+        return gather(points, P, eye, light, tables);
+    }
+
+    template <class Points> void block(const Points &from, size_t first, size_t count, int P, float *radiance) const {
+        FibrePoints p = read(from, first, count, P);
         Floats sum[3];
-        light_block(p, light, tables, sum);
+        MeanOnly mean;
+        light_block(p, light, tables, sum, mean);
         for (size_t i = 0; i < 16 && first + i < count; ++i)
             for (int c = 0; c < 3; ++c) radiance[3 * (first + i) + c] = sum[c][i];
     }
 
     void shade(const StrandPoint *points, size_t count, int P, float *radiance) const override {
         for (size_t first = 0; first < count; first += 16) block(points, first, count, P, radiance);
+    }
+
+    bool varies_across() const override { return tables.across; }
+
+    void shade_across(const StrandPoint *points, size_t count, int P, Across *to) const override {
+        for (size_t first = 0; first < count; first += 16) {
+            FibrePoints p = read(points, first, count, P);
+            Floats mean[3];
+            NearField places(tables, p.level, inclination(tables, p.theta), p.cosine);
+            light_block(p, light, tables, mean, places);
+            places.write(mean, std::min(count - first, size_t(16)), to + first);
+        }
     }
 
     /// Fills `radiance` (count, 3) of the points that are wanted.

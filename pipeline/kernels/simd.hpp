@@ -239,6 +239,17 @@ RINGLET_INLINE Lanes<float> gather_floats(const float *values, Mask<float> at) {
 #endif
 }
 
+/// Lane at[k] of the values, 0 <= at < 16, in every lane k.
+RINGLET_INLINE Lanes<float> pick(Lanes<float> values, Mask<float> at) {
+#ifdef __AVX512F__
+    return Lanes<float>(_mm512_maskz_permutexvar_ps(0xffff, __m512i(at), __m512(values)));
+#else
+    Lanes<float> result;
+    for (int lane = 0; lane < kLanes<float>; ++lane) result[lane] = values[at[lane]];
+    return result;
+#endif
+}
+
 /// values[at] of every lane; three more bytes behind the last value may be read.
 RINGLET_INLINE Mask<float> gather_bytes(const int8_t *values, Mask<float> at) {
 #ifdef __AVX512F__

@@ -7,8 +7,8 @@
 // kBefore in front of what had been taken last is mixed, and is drawn again in the order of a smaller square.
 #pragma once
 
+#include "across.hpp"
 #include "bins.hpp"
-#include "coverage.hpp"
 #include "elementary.hpp"
 
 namespace ringlet {
@@ -82,6 +82,13 @@ class Tile {
     /// The hair of the tile is about as deep as this.
     void around(float depth) { before_ = view_.deeper(depth, kBefore); }
 
+    /// Colours across the block's wide segments; null where it has none.
+    void with(const Sides *sides) {
+        if (sides == sides_) return;
+        sides_ = sides;
+        gaps_.assign(sides ? kPixels : 0, Gaps{});
+    }
+
     /// Starts a tile, of which these pixels are wanted.
     void begin(int tile, const TilePixels &wanted) {
         left_ = view_.left(tile), top_ = view_.top(tile);
@@ -91,6 +98,7 @@ class Tile {
         fragments_.count = 0, drawn_to_ = 0;
         std::memset(window_, 0, sizeof window_);
         std::memset(mixed_, 0, sizeof mixed_);
+        gaps_.assign(gaps_.size(), Gaps{});
         deepest_ = splat(0.0f);
         std::memset(last_, 0, sizeof last_);
         std::memset(shown_, 0, sizeof shown_);
@@ -257,6 +265,8 @@ class Tile {
     TilePixels open_, drawn_;
     CellCentres centres_;
     TileSteps step_;
+    const Sides *sides_ = nullptr;
+    std::vector<Gaps> gaps_; // of each pixel, where segments have sides
 
     bool is_open(int p) const { return clear_[p] >= kClosed; }
 
@@ -307,7 +317,8 @@ class Tile {
             part *= along(s, crossing(s, p), centres_);
             if (shown[3] > nearest_[p]) part = in_front(part, shown[3], left_ + int(p % kTile), top_ + int(p / kTile));
         }
-        const Cells taken = T_[p] * part;
+        Cells taken = T_[p] * part;
+        if (sides_ && shows_sides(s)) shown_[p] += aside(s, crossing(s, p), centres_, T_[p], part, taken, gaps_[p], sides_->ends(number));
         T_[p] -= taken;
         const float weight = sum_cells(taken) * (1.0f / (kCells * kCells));
         note(p, shown[3], weight);

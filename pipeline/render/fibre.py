@@ -32,6 +32,7 @@ ETA: Final = 1.55
 ABSORPTION_MAX: Final = 8.0
 """[1/radius] absorption at the last level: darker hair shows only its R lobe, as this does."""
 LEVELS, INCLINATIONS, AZIMUTHS, NODES = 24, 52, 48, 140
+_PLACES: Final = 8  # from the middle of a fibre to its side: see near_field.hpp
 _DIRECTIONS: Final = 64
 _INCLINED, _AROUND = 16, 24  # fibres and azimuths of the mean answer to light from a direction
 _GREY: Final = 0.9999
@@ -257,8 +258,21 @@ class Scattering:
         second = 5 * answers[1] * (1.5 * np.minimum(half**2, 1) - 0.5)
         return answers.sum(axis=(1, 3)).T, second.sum(axis=(0, 2))
 
-    def tables(self, pigment: _F32) -> kernels.FibreTables:
-        """The tables as the shading kernel takes them, with a `pipeline.render.pigment.table` (K, J, 4)."""
+    @cached_property
+    def across(self) -> _F64:
+        """(A, T, 32): mean of A_p over each eighth of the way from the middle to a side, by that over all of it."""
+        nodes, weights = np.polynomial.legendre.leggauss(NODES // _PLACES)
+        cosine = np.cos(np.minimum(np.linspace(0, np.pi / 2, INCLINATIONS), 1.5707))
+        h = (np.arange(_PLACES)[:, None] + (1 + nodes) / 2) / _PLACES
+        leaving = attenuation(cosine[:, None, None], h, self.levels[:, None, None, None]) @ (weights / 2)
+        shares = leaving / np.maximum(leaving.mean(-1, keepdims=True), 1e-300)
+        return np.asarray(np.moveaxis(shares, 0, 2).reshape(LEVELS, INCLINATIONS, -1))
+
+    def tables(self, pigment: _F32, near: bool = True) -> kernels.FibreTables:
+        """The tables as the shading kernel takes them, with a `pipeline.render.pigment.table` (K, J, 4).
+
+        Without `near`, wide strands show their mean over their width.
+        """
         lobes, means = self.far_field
         record = [*lobes, means[0], means[1], means[2] + means[3], 0 * means[0]]
         # The cuticle's scales lean towards the tip: R turns to the tip, TT and TRT to the root
@@ -272,4 +286,7 @@ class Scattering:
             ABSORPTION_MAX,
         )
         tables.reciprocal = self.reciprocal
+        if near:
+            across = np.ascontiguousarray(self.across, np.float32)
+            tables.vary_across(across, ETA, scale(self.azimuthal_roughness))
         return tables

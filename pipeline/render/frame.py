@@ -21,6 +21,7 @@ from pipeline.render.geometry import (
     Shape,
     choose_shapes,
     drawn_width,
+    one_fibre_each,
     projected_width,
     ribbons,
     smooth,
@@ -104,7 +105,8 @@ class FrameRenderer:
         self._points = self.count * ((strands.points - 1) * render.subdivide + 1)
         self._exact = told_apart(self._points, self.count * strands.length, self.width)
         self.variation = pigment.variation(render.hair, config.seed, key)
-        self._now = _Lit(Chunks(strands, self.count), Lighting(scene, render.hair, render.grid))
+        single = one_fibre_each(render, self.count, strands.count)
+        self._now = _Lit(Chunks(strands, self.count), Lighting(scene, render.hair, render.grid, single))
         self._next = self._now.beside(strands, self.count)
         self._ahead = ThreadPoolExecutor(1, "light")
         across, down = (side * render.samples for side in render.size)

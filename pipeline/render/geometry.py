@@ -35,6 +35,11 @@ def drawn_width(render: Render, strands: int, of: int | None = None) -> float:
     return width * of / strands
 
 
+def one_fibre_each(render: Render, strands: int, of: int | None = None) -> bool:
+    """Whether a drawn strand is a fibre that shows its sides: one that stands for two or more shows their mean."""
+    return bool(drawn_width(render, strands, of) < np.sqrt(2) * (render.width or _FIBRE))
+
+
 def projected_width(render: Render, camera: View, width: float, middle: NDArray[np.float64]) -> float:
     """Width [px] of a strand of `width` [m] that passes through `middle` (3,) [m]."""
     forward = np.subtract(camera.look_at, camera.position)

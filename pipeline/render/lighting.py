@@ -67,15 +67,18 @@ class _Shadowed:
 class Lighting:
     """Light on hair and head, frame by frame: `begin`, `add` all strands, `finish`, then `shade` any of them."""
 
-    def __init__(self, scene: Scene, hair: Fibre, grid: int) -> None:
-        """Prepare what does not change from frame to frame: `grid` voxels along the longest side of the hair."""
+    def __init__(self, scene: Scene, hair: Fibre, grid: int, one_fibre_each: bool = True) -> None:
+        """Prepare what does not change from frame to frame: `grid` voxels along the longest side of the hair.
+
+        Strands that are no `one_fibre_each` show their mean over their width, however wide they are drawn.
+        """
         self._hair = hair
         self._voxels = grid
         self._directions, self._irradiance = as_directions(scene.lights)
         self._sky = np.array(scene.environment, np.float32)
         scattering = fibre.Scattering(hair.roughness, hair.azimuthal_roughness, hair.tilt, hair.reciprocal)
         colours = pigment.table(hair)
-        self._tables = scattering.tables(colours)
+        self._tables = scattering.tables(colours, one_fibre_each)
         middle = colours[:, colours.shape[1] // 2, :3]
         self._around = Sky(scattering, middle.mean(axis=0, dtype=np.float64))
         # Light that comes from everywhere has passed all of the strands
