@@ -331,7 +331,7 @@ class Tile {
     /// it would have taken of that which is gone.
     RINGLET_INLINE void note(uint32_t p, float depth, float weight) {
         const float missed = weight * ((1 - clear_[p]) / clear_[p]);
-        mixed_[p] += missed * (depth + before_ < last_[p] ? 1.0f : 0.0f); // a factor, for no branch can tell it in time
+        mixed_[p] += missed * (depth + before_ < last_[p] ? 1.0f : 0.0f);
         last_[p] += std::min(weight * (1 / kLast), 1.0f) * (depth - last_[p]);
     }
 
