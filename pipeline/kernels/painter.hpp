@@ -202,7 +202,7 @@ class Painter {
         for (size_t i = 0; i < unshaded_.size(); ++i) {
             SeenPoint &to = *bins_.seen(unshaded_[i]);
             for (int c = 0; c < 3; ++c) __atomic_store(&to.colour[c], &radiance_[3 * i + c], __ATOMIC_RELAXED);
-            __atomic_fetch_or(&to.number, SeenPoint::kKnown, __ATOMIC_RELEASE);
+            __atomic_store_n(&to.number, known(unshaded_[i]) | SeenPoint::kKnown, __ATOMIC_RELEASE); // all write the same
         }
         for (const uint32_t i : uncoloured_) {
             const SeenPoint *ends = bins_.seen(number_[i]);
