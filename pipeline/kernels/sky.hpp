@@ -147,27 +147,34 @@ struct SkySums {
     }
 };
 
-/// Adds up what threads have of slab x and visits (k, value of the k-th sum, number in (nx, ny, nz)).
+/// Adds up what threads have of slab x and visits (sums of one voxel, number in (nx, ny, nz)).
 template <class Visit>
 RINGLET_INLINE void each_sum(const std::vector<std::unique_ptr<SkySums>> &all, const int n[3], int across_z, int x, Visit &&visit) {
-    std::vector<const SkySums *> begun;
-    for (const auto &own : all)
-        if (own && own->begun[across_z]) begun.push_back(own.get());
     const Rows rows(n, across_z);
     const int line = across_z ? 2 : 1, along = 3 - line;
+    const size_t step = across_z ? n[2] : 1; // between the voxels of a row
     for (int i = 0; i < n[line]; ++i)
-        for (int j = 0; j < n[along]; j += 16)
-            for (int k = 0; k < SkySums::kSums; ++k) {
-                Ints sum{};
-                for (const SkySums *own : begun) {
+        for (int j = 0; j < n[along]; j += 16) {
+            const size_t from = x * rows.stride(0) + i * rows.stride(line) + j, lanes = std::min(16, n[along] - j);
+            const size_t voxel = (size_t(x) * n[1] + (across_z ? j : i)) * n[2] + (across_z ? i : j);
+            Ints sums[SkySums::kSums] = {};
+            for (const auto &own : all) {
+                if (!own || !own->begun[across_z]) continue;
+#pragma GCC unroll 16
+                for (int k = 0; k < SkySums::kSums; ++k) {
                     Ints part;
-                    __builtin_memcpy(&part, own->rows[across_z][k] + x * rows.stride(0) + i * rows.stride(line) + j, sizeof part);
-                    sum += part;
+                    __builtin_memcpy(&part, own->rows[across_z][k] + from, sizeof part);
+                    sums[k] += part;
                 }
-                const Floats value = real(sum) * (1 / SkySums::kWhole);
-                for (int lane = 0; lane < 16 && j + lane < n[along]; ++lane)
-                    visit(k, value[lane], (size_t(x) * n[1] + (across_z ? j + lane : i)) * n[2] + (across_z ? i : j + lane));
             }
+            float values[SkySums::kSums][16];
+#pragma GCC unroll 16
+            for (int k = 0; k < SkySums::kSums; ++k) {
+                const Floats value = real(sums[k]) * (1 / SkySums::kWhole);
+                __builtin_memcpy(values[k], &value, sizeof value);
+            }
+            for (size_t lane = 0; lane < lanes; ++lane) visit([&](int k) RINGLET_ALWAYS { return values[k][lane]; }, voxel + lane * step);
+        }
 }
 
 /// Writes the mean of e^(-k n - body) over all directions, as hair answers, to entries 0, 1, 2 of records (nx, ny, nz, 16), what
@@ -187,13 +194,18 @@ inline void write_transmittance(const Sky &sky, float *records, float *open, int
             else own->add<1>({&hair}, sky, groups[k]);
         }
     }
-    const auto to = [&](int k, size_t voxel) RINGLET_ALWAYS -> float & {
-        return k < 3 ? records[16 * voxel + k] : k < 6 ? open[4 * voxel + k - 3] : records[16 * voxel + k + 2];
+    const auto add = [&](const auto &sum, size_t voxel, float kept) RINGLET_ALWAYS {
+        float *record = records + 16 * voxel, *plain = open + 4 * voxel;
+#pragma GCC unroll 16
+        for (int k = 0; k < SkySums::kSums; ++k) {
+            float &to = k < 3 ? record[k] : k < 6 ? plain[k - 3] : record[k + 2];
+            to = kept * to + sum(k);
+        }
     };
 #pragma omp parallel for schedule(static) num_threads(threads)
     for (int x = 0; x < sky.n[0]; ++x) {
-        each_sum(all, sky.n, false, x, [&](int k, float light, size_t voxel) RINGLET_ALWAYS { to(k, voxel) = light; });
-        each_sum(all, sky.n, true, x, [&](int k, float light, size_t voxel) RINGLET_ALWAYS { to(k, voxel) += light; });
+        each_sum(all, sky.n, false, x, [&](const auto &sum, size_t voxel) RINGLET_ALWAYS { add(sum, voxel, 0); });
+        each_sum(all, sky.n, true, x, [&](const auto &sum, size_t voxel) RINGLET_ALWAYS { add(sum, voxel, 1); });
     }
 }
 

@@ -134,8 +134,8 @@ RINGLET_INLINE Floats gloss(const SkinPoints &p, const Vec3<float> &L, Floats fa
 inline void light_skin(const SkinPoints &p, const Illumination &light, const Occluder &head, const float loss[3],
                        Floats radiance[3]) {
     const Floats albedo[3] = {p.albedo.x, p.albedo.y, p.albedo.z};
-    // One of the sky's voxels above the head in it: what a half space sees of the sky is half of all directions
-    const Vec3<float> g = in_voxels(light, p.x), above = from_centre(light, p.x);
+    // Just above the skin, where the head's voxels show no more; a half space sees half of all directions
+    const Vec3<float> g = in_voxels(light, p.x) + splat(0.5f) * p.normal, above = from_centre(light, p.x);
     Floats around[4];
     SkyPlace(light, g).read<Four>(light.open, 4, around);
     const Floats beyond = outside(light, g);

@@ -15,8 +15,8 @@ from pipeline.render.fibre import Scattering
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]
 
-_DIRECTIONS: Final = 20
-_WITHIN: Final = 2048
+_DIRECTIONS: Final = 26
+_WITHIN: Final = 1024
 """Directions over which the cells' means are taken."""
 _COSINES: Final = 129
 

@@ -22,6 +22,7 @@ from pipeline.render import fibre, pigment
 from pipeline.render.camera import CameraPath
 from pipeline.render.geometry import drawn_width
 from pipeline.render.lighting import Lighting
+from pipeline.render.sky import Sky
 
 _F64 = NDArray[np.float64]
 
@@ -175,6 +176,38 @@ def sky_on(hair: Hair, wider: float, colour: Fibre, points: Seen, eye: _F64) -> 
     which = np.arange(1, 3 * len(strands), 3, dtype=np.uint32)
     radiance = light.shade(strands, variation, np.zeros(len(strands), np.uint32), eye, which)
     return np.asarray(radiance[:, 1], np.float64)
+
+
+@pytest.mark.parametrize("distance", [0.1, 0.8, 100.0])
+def test_under_an_even_sky_all_fibres_answer_alike(distance: float) -> None:
+    """No light is made: from anywhere, answers have the mean 1, and what mirrors more here does less there."""
+    sky = Sky(fibre.Scattering(0.3, 0.3, 0.0), np.array([0.2, 0.5, 1.5]))
+    for toward in spiral(7):
+        answers = sky.answers(distance * toward, 0.4)
+        mean, turned, moments = (
+            answers[:, part].mean(axis=0) for part in (slice(3), slice(3, 12), slice(12, 17))
+        )
+        most = np.abs(answers[:, 3:12]).max(), np.abs(answers[:, 12:]).max()
+        assert np.abs(mean - 1).max() < 1e-5
+        assert np.abs(turned).max() < 1e-5 * most[0]
+        assert np.abs(moments).max() < 1e-5 * most[1]
+    print(f"at {distance} m answers turn by {most[0]:.2f} a metre, fibres mirror up to {most[1]:.2f} more")
+
+
+def test_white_hair_in_a_white_room_is_white_whichever_way_it_lies() -> None:
+    mat = Hair(locks(40, 10, 3), WIDTH, None, 64)
+    rng = np.random.default_rng(1)
+    eye = np.array([0.0, 0.3, 0.7])
+    x = rng.uniform(-0.5, 0.5, (200, 3)) * [LONG, HIGH, THICK]
+    tangent = rng.normal(size=(200, 3))
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    points = Seen(
+        x, np.zeros(200, np.intp), tangent, (eye - x) / np.linalg.norm(eye - x, axis=1, keepdims=True)
+    )
+    radiance = sky_on(mat, 1, Fibre(melanin=0.0), points, eye)
+    print(f"{radiance.min():.3f} to {radiance.max():.3f}")
+    assert radiance.min() > 0.97
+    assert radiance.max() < 1.001
 
 
 @pytest.mark.parametrize("toward", [(0.0, 0.2, 1.0), (0.3, -0.5, 0.8)])
