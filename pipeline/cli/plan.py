@@ -145,7 +145,7 @@ def _light(config: Config) -> float:
     points = count * ((config.groom.points - 1) * render.subdivide + 1)
     strands = points, count * _LENGTH, drawn_width(render, count, _strands(config))
     directions, _ = as_directions(config.scene.lights)
-    each = _LIGHT_B_PER_PIECE * pieces(*strands) if told_apart(*strands) else 0.0
+    each = _LIGHT_B_PER_PIECE * pieces(*strands) if told_apart(*strands, len(directions)) else 0.0
     each += _NODES * _LIGHT_B_PER_NODE * render.grid**2
     return len(directions) * each + _LIGHT_B_PER_VOXEL * render.grid**3
 

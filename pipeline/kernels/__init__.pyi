@@ -692,7 +692,7 @@ class Shadows:
         spacing: float,
         width: float,
         share: float = 1.0,
-        exact: bool = False,
+        told: float = 0.0,
     ) -> None:
         """Empties the maps, in the memory that they have.
 
@@ -702,7 +702,7 @@ class Shadows:
             spacing: [m], between the nodes of a map; the bounds are at most 2000 of it.
             width: [m], a typical drawn width.
             share: the part of all strands that is added, as much wider, to cast the shadows of all.
-            exact: so few strands are added that `lit` shall tell past which of them light goes.
+            told: the part of all strands, where they are few, of which it is told past which others light goes.
 
         """
 
@@ -724,7 +724,7 @@ class Shadows:
         """
 
     def lit(self, light: int, axis: _F32, ways: _F32, roots: _F32, places: _F32) -> _F32:
-        """Parts (N,) of strands around points that a light reaches past all other strands, where shadows are exact.
+        """Parts (N,) of strands around points that a light reaches past all other strands, where strands are told apart.
 
         Args:
             light: its number.

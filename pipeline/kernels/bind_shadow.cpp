@@ -20,12 +20,13 @@ static void make_shadows(Shadows *shadows, Directions directions) {
     new (shadows) Shadows(std::move(held));
 }
 
-static void begin(Shadows &shadows, Doubles lower, Doubles upper, double spacing, double width, double share, bool exact) {
+static void begin(Shadows &shadows, Doubles lower, Doubles upper, double spacing, double width, double share, double told) {
     Bounds bounds{};
-    bounds.spacing = float(spacing), bounds.width = float(width), bounds.share = float(share), bounds.exact = exact;
+    bounds.spacing = float(spacing), bounds.width = float(width), bounds.share = float(share), bounds.told = float(told);
     require(spacing > 0 && std::isfinite(spacing), "Shadows.begin: expected a positive spacing");
     require(width > 0 && std::isfinite(width), "Shadows.begin: expected a positive width");
     require(share > 0 && share <= 1, "Shadows.begin: expected a share of 0 .. 1");
+    require(told >= 0 && told <= 1, "Shadows.begin: expected told of 0 .. 1");
     for (int k = 0; k < 3; ++k) {
         bounds.lower[k] = lower.data()[k], bounds.upper[k] = upper.data()[k];
         const double size = bounds.upper[k] - bounds.lower[k];
@@ -76,7 +77,7 @@ static nb::ndarray<nb::numpy, float> reached(const Shadows &shadows, int light, 
 static nb::ndarray<nb::numpy, float> lit_parts(const Shadows &shadows, int light, Array<const float, -1, 3> axis, Array<const float, -1, 2, 3> ways,
                                               Array<const float, -1, 3> roots, Array<const float, -1> places) {
     require(light >= 0 && light < int(shadows.directions.size()), "Shadows.lit: no such light");
-    require(shadows.finished && !shadows.blockers[light].empty(), "Shadows.lit: finish exact shadows of strands first");
+    require(shadows.finished && !shadows.blockers[light].empty(), "Shadows.lit: finish strands that are told apart first");
     const size_t N = axis.shape(0);
     require(ways.shape(0) == N && roots.shape(0) == N && places.shape(0) == N, "Shadows.lit: arrays differ in length");
     auto result = new_array<float>({N});
@@ -92,7 +93,7 @@ static nb::ndarray<nb::numpy, float> lit_parts(const Shadows &shadows, int light
             }
             strand[k] = Casters::name(roots.data() + 3 * i), place[k] = places.data()[i];
         }
-        const Around around{{x[0], x[1], x[2]}, {{way[0][0], way[0][1], way[0][2]}, {way[1][0], way[1][1], way[1][2]}}, strand, place};
+        const Around around{{x[0], x[1], x[2]}, {{way[0][0], way[0][1], way[0][2]}, {way[1][0], way[1][1], way[1][2]}}, strand, place, Ints{} - 1};
         const Floats lit = shadows.blockers[light].lit(shadows.maps[light], around);
         for (size_t k = 0; k < 16 && first + k < N; ++k) out[first + k] = lit[k];
     }
@@ -114,7 +115,7 @@ void bind_shadow(nb::module_ &m) {
     nb::class_<Shadows>(m, "Shadows")
         .def("__init__", &make_shadows, nb::arg("directions"))
         .def("begin", &begin, nb::arg("lower"), nb::arg("upper"), nb::arg("spacing"), nb::arg("width"), nb::arg("share") = 1.0,
-             nb::arg("exact") = false)
+             nb::arg("told") = 0.0)
         .def("add", &add, nb::arg("points"), nb::arg("widths"))
         .def("finish", &finish, nb::arg("hair"), nb::arg("origin"), nb::arg("spacing"), nb::arg("field").none(), nb::arg("pose"))
         .def("map", &map_of, nb::arg("light"))

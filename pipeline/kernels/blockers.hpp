@@ -2,9 +2,9 @@
 // need nodes as narrow as a strand.
 //
 // Seen from the light, strands are bands on the map (u, v), w away from the light, cut into pieces no longer than a cell of
-// the map, and each cell lists the pieces that may touch it. Where a stretch of a strand runs below a piece's band is an
-// interval along the stretch: 16 places of the stretch that it hides are bits of a word, and the words of all pieces are
-// joined by `or`, so that nothing depends on their order, nor on how often a piece is looked at.
+// the map, and each cell lists the pieces that may touch it, those nearest the light first. Where a stretch of a strand runs
+// below a piece's band is an interval along the stretch: 16 places of the stretch that it hides are bits of a word, and the
+// words of all pieces are joined by `or`, so that nothing depends on their order, nor on how often a piece is looked at.
 // A strand's own segment and two on either side of it do not count: what a fibre does to its own light, its lobes say.
 #pragma once
 
@@ -21,6 +21,7 @@ struct Around {
     Vec3<float> axis, ways[2]; // [m] from the maps' centre on; to both sides along the strand
     Words strand;              // `Casters::name`
     Floats place;              // 0 at the root, 1 at the tip
+    Ints told;                 // whether it is asked what light reaches them
 };
 
 class Blockers {
@@ -33,22 +34,25 @@ class Blockers {
     void fill(const ShadowMap &map, const Casters &casters) {
         cell_ = std::max(kWide * map.width, 2 * map.spacing), segments_ = casters.P - 1;
         for (int k = 0; k < 2; ++k) low_[k] = map.low[k], n_[k] = int(map.spacing * map.n[k] / cell_) + 1;
+        layer_ = float(std::max(-2 * map.low[2], map.spacing)) / kLayers;
         begin_.assign(size_t(n_[0]) * n_[1] + 1, 0);
-        each_piece(map, casters, [&](const Piece &piece) { each_cell(piece, [&](size_t cell) { ++begin_[cell + 1]; }); });
+        std::vector<Piece> pieces; // of all strands, in their order
+        each_piece(map, casters, [&](const Piece &piece) {
+            pieces.push_back(piece);
+            each_cell(piece, [&](size_t cell) { ++begin_[cell + 1]; });
+        });
         for (size_t cell = 1; cell < begin_.size(); ++cell) begin_[cell] += begin_[cell - 1];
+        const std::vector<uint32_t> sorted = sort_into_cells(pieces);
         for (std::vector<float> &field : fields_) field.resize(begin_.back() + 16);
         strand_.resize(begin_.back() + 16);
-        std::vector<size_t> next(begin_.begin(), begin_.end() - 1);
-        each_piece(map, casters, [&](const Piece &piece) {
-            each_cell(piece, [&](size_t cell) {
-                const size_t to = next[cell]++;
-                for (int k = 0; k < 3; ++k) fields_[k][to] = piece.from[k], fields_[3 + k][to] = piece.way[k];
-                fields_[6][to] = piece.radius, fields_[7][to] = piece.segment, strand_[to] = piece.strand;
-            });
-        });
+        for (size_t to = 0; to < sorted.size(); ++to) {
+            const Piece &piece = pieces[sorted[to]];
+            for (int k = 0; k < 3; ++k) fields_[k][to] = piece.from[k], fields_[3 + k][to] = piece.way[k];
+            fields_[6][to] = piece.radius, fields_[7][to] = piece.segment, strand_[to] = piece.strand;
+        }
     }
 
-    /// Part of the ways of 16 points that the map's light reaches.
+    /// Part of the ways of 16 points that the map's light reaches; 0 where nobody asks.
     __attribute__((noinline)) Floats lit(const ShadowMap &map, const Around &around) const {
         alignas(64) float from[3][16], ways[6][16], segment[16], parts[16];
         alignas(64) uint32_t strand[16];
@@ -57,7 +61,10 @@ class Blockers {
             write(ways[k], on_axis(map.axis[k], around.ways[0])), write(ways[3 + k], on_axis(map.axis[k], around.ways[1]));
         }
         write(strand, around.strand), write(segment, around.place * float(segments_));
+        const uint32_t told = set_lanes<float>(around.told);
         for (int i = 0; i < 16; ++i) {
+            parts[i] = 0;
+            if (!(told >> i & 1)) continue;
             int places = 0, hides = 0;
             for (int side = 0; side < 6; side += 3) {
                 const Stretch one{{from[0][i], from[1][i], from[2][i]}, {ways[side][i], ways[side + 1][i], ways[side + 2][i]}, strand[i], segment[i]};
@@ -74,6 +81,7 @@ class Blockers {
   private:
     static constexpr float kWide = 8, kOwn = 2.5f; // widths along a cell; segments
     static constexpr int kPlaces = 16;           // of a way
+    static constexpr int kLayers = 256;
     static constexpr uint32_t kAll = (1u << kPlaces) - 1;
 
     struct Stretch {
@@ -86,11 +94,29 @@ class Blockers {
         float radius;
     };
 
-    float cell_ = 1, low_[2] = {0, 0}; // [m]
+    float cell_ = 1, layer_ = 1, low_[2] = {0, 0}; // [m]
     int n_[2] = {0, 0}, segments_ = 0;
     std::vector<size_t> begin_;    // of each cell's pieces
     std::vector<float> fields_[8]; // of pieces, cell after cell: from, way, radius, segment; 16 more
     std::vector<uint32_t> strand_;
+
+    /// Which pieces are in each cell, cell after cell, by the layer in which they begin.
+    std::vector<uint32_t> sort_into_cells(const std::vector<Piece> &pieces) const {
+        std::vector<size_t> next(kLayers + 1);
+        for (const Piece &piece : pieces) ++next[layer(piece.from[2], piece.way[2]) + 1];
+        for (int layer = 0; layer < kLayers; ++layer) next[layer + 1] += next[layer];
+        std::vector<uint32_t> order(pieces.size()), sorted(begin_.back());
+        for (size_t i = 0; i < pieces.size(); ++i) order[next[layer(pieces[i].from[2], pieces[i].way[2])]++] = uint32_t(i);
+        next.assign(begin_.begin(), begin_.end() - 1);
+        for (const uint32_t i : order) each_cell(pieces[i], [&](size_t cell) { sorted[next[cell]++] = i; });
+        return sorted;
+    }
+
+    /// The layer of the hair, from the light on, in which a piece begins.
+    int layer(float from, float way) const {
+        const float place = (from + std::min(way, 0.0f)) / layer_;
+        return place > 0 ? int(std::min(place, kLayers - 1.0f)) : 0;
+    }
 
     template <class Visit> void each_piece(const ShadowMap &map, const Casters &casters, Visit &&visit) const {
         for (size_t s = 0; s < casters.count; ++s)
@@ -138,15 +164,25 @@ class Blockers {
     uint32_t hidden(const Stretch &one) const {
         int first[2], last[2];
         for (int k = 0; k < 2; ++k) range(one.from[k], one.from[k] + one.way[k], 0, k, first[k], last[k]);
+        const int deepest = layer(one.from[2] + std::max(one.way[2], 0.0f), 0);
         uint32_t bits = 0;
         for (int i = first[0]; i <= last[0]; ++i)
-            for (int j = first[1]; j <= last[1] && bits != kAll; ++j) {
-                const size_t cell = size_t(i) * n_[1] + j;
-                Words some{};
-                for (size_t k = begin_[cell]; k < begin_[cell + 1]; k += 16) some |= hidden_by(k, begin_[cell + 1] - k, one);
-                for (int lane = 0; lane < 16; ++lane) bits |= some[lane];
+            for (int j = first[1]; j <= last[1]; ++j) {
+                const size_t cell = size_t(i) * n_[1] + j, end = begin_[cell + 1];
+                for (size_t k = begin_[cell]; k < end && layer(fields_[2][k], fields_[5][k]) <= deepest; k += 16) {
+                    bits |= joined(hidden_by(k, end - k, one));
+                    if (bits == kAll) return bits;
+                }
             }
         return bits;
+    }
+
+    /// Bits that are set in any lane.
+    static RINGLET_INLINE uint32_t joined(Words bits) {
+        uint64_t pairs[8], all = 0;
+        __builtin_memcpy(pairs, &bits, sizeof bits);
+        for (const uint64_t pair : pairs) all |= pair;
+        return uint32_t(all | all >> 32);
     }
 
     static RINGLET_INLINE Floats on_axis(const float axis[3], const Vec3<float> &x) { return axis[0] * x.x + axis[1] * x.y + axis[2] * x.z; }

@@ -73,12 +73,14 @@ struct FibrePoints {
     Layer layers[3];
     Floats passed, forward, back;   // green's a_f; variance that each fibre adds to light it passes, and of light from behind
     Words patch;                    // of 4 mm of its strand: from hash to hash evenly spread
-    bool exact;                     // it is known where light goes past single strands
-    Around around;                  // if so, half a segment to both sides, half a patch at most,
-    Floats lit;                     // and the part of it that one light reaches
+    Around around;                  // half a segment to both sides, half a patch at most, where strands are told apart
+    Floats lit;                     // the part of it that one light reaches
+    Ints told;                      // whether that is known
 };
 
 constexpr float kPatch = 4e-3f; // [m] length of strand that is lit or shadowed as one
+constexpr float kUnlit = 12;    // strands behind which no light is looked for
+constexpr uint32_t kTold = 7;  // of a hash
 // Nodes of a shadow map. Of the strands whose shadows a node sums up the eye sees the foremost: they lie before its mean.
 // `test_points_that_are_seen_are_lit_as_exact_rays_say`
 constexpr float kBefore = 0.25f;
@@ -113,13 +115,16 @@ inline void read_colour(const FibreTables &tables, Floats along, Floats u, Float
 __attribute__((noinline)) inline Around look_around(const StrandPoint (&points)[16], int P, const Illumination &light) {
     float axis[3][16], ways[6][16], place[16];
     uint32_t name[16];
+    Words own;
     for (int i = 0; i < 16; ++i) {
         const int j = points[i].j;
         const float *at = points[i].root + 3 * j, *before = j > 0 ? at - 3 : at, *after = j + 1 < P ? at + 3 : at;
         for (int c = 0; c < 3; ++c) axis[c][i] = at[c], ways[c][i] = before[c] - at[c], ways[3 + c][i] = after[c] - at[c];
-        place[i] = float(j) / float(P - 1), name[i] = Casters::name(points[i].root);
+        place[i] = float(j) / float(P - 1), name[i] = Casters::name(points[i].root), own[i] = points[i].key;
     }
     Around around;
+    const Floats other = uniform(mix(own + mix(kTold)));
+    around.told = other < light.shadows->told;
     __builtin_memcpy(&around.axis, axis, sizeof axis), __builtin_memcpy(&around.ways, ways, sizeof ways);
     __builtin_memcpy(&around.place, place, sizeof place), __builtin_memcpy(&around.strand, name, sizeof name);
     around.axis = from_centre(light, around.axis);
@@ -169,8 +174,8 @@ inline FibrePoints gather(const StrandPoint (&points)[16], int P, const double (
     __builtin_memcpy(differs, own, sizeof own);
     __builtin_memcpy(&place, along, sizeof along);
     read_colour(tables, place + differs[2], differs[0], differs[1], p);
-    p.exact = light.lights && !light.shadows->blockers[0].empty();
-    if (p.exact) p.around = look_around(points, P, light);
+    p.told = Ints{}, p.lit = splat(0.0f);
+    if (light.lights && light.shadows->told > 0) p.around = look_around(points, P, light), p.told = p.around.told;
     return p;
 }
 
@@ -237,7 +242,7 @@ __attribute__((noinline)) void add_light(const FibrePoints &p, const Illuminatio
     const Floats through = exponential(-way.n), past = exponential(-way.behind);
     const Words glint = p.patch + mix(uint32_t(l + 1));
     const Floats alone = exponential(-before), chance = light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f)) : alone;
-    const Floats seen = p.exact ? p.lit : chance;
+    const Floats seen = p.told ? p.lit : chance;
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
     places.turn(dot(cross(p.tangent, p.to_eye), L) < 0.0f ? -phi : phi);
     for (int c = 0; c < 3; ++c) {
@@ -261,6 +266,14 @@ RINGLET_INLINE Floats mirrors(const Vec3<float> &t, const Floats M[5]) {
     return 1.5f * (diagonal + 2.0f * (M[2] * t.x * t.y + M[3] * t.x * t.z + M[4] * t.y * t.z));
 }
 
+/// The part of the strands around 16 points that a light reaches, where it is asked for: deep in the hair it is none.
+__attribute__((noinline)) inline Floats look_past(const FibrePoints &p, const Shadows &shadows, int l) {
+    const Reach way = reach(shadows.maps[l], p.at, 1.0f);
+    Around around = p.around;
+    around.told &= (way.n < kUnlit) & (way.visible > 0.0f);
+    return shadows.blockers[l].lit(shadows.maps[l], around);
+}
+
 /// Light of 16 points from everywhere.
 template <class Places>
 void light_block(FibrePoints &p, const Illumination &light, const FibreTables &tables, Floats radiance[3], Places &places) {
@@ -277,7 +290,7 @@ void light_block(FibrePoints &p, const Illumination &light, const FibreTables &t
         radiance[c] = light.sky[c] * p.albedo[c] * (r + (1.0f - r) * open);
     }
     for (int l = 0; l < light.lights; ++l) {
-        if (p.exact) p.lit = light.shadows->blockers[l].lit(light.shadows->maps[l], p.around);
+        if (light.shadows->told > 0) p.lit = look_past(p, *light.shadows, l);
         add_light(p, light, l, tables, normal, radiance, places);
     }
 }

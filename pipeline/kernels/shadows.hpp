@@ -11,7 +11,7 @@ struct Bounds {
     double lower[3], upper[3]; // [m]
     float spacing, width;      // [m] between nodes; a typical drawn width
     float share;               // part of all strands that casts shadows for all of them
-    bool exact;                // so few strands that it is told which of them a ray meets
+    float told;                // part of them of which it is told past which others light goes
 };
 
 /// Lays a map of the light in this direction over the bounds: two unit vectors across it are Duff et al., Building an
@@ -47,6 +47,7 @@ struct Shadows {
     std::vector<Blockers> blockers; // for each map, beside it; of none where strands are many
     Casters casters;
     ShadowFill fill;
+    float told = 0;
     bool finished; // as soon as nothing is missing, which without lights is at once
 
     explicit Shadows(std::vector<std::array<float, 3>> lights) : directions(std::move(lights)), finished(directions.empty()) {}
@@ -55,7 +56,7 @@ struct Shadows {
     /// Forgets all strands; maps keep their memory.
     void begin(const Bounds &bounds) {
         maps.resize(directions.size()), blockers.resize(directions.size());
-        exact_ = bounds.exact;
+        told = bounds.told;
         for (size_t l = 0; l < maps.size(); ++l) lay(maps[l], directions[l].data(), bounds);
         casters.clear();
         finished = directions.empty();
@@ -79,13 +80,10 @@ struct Shadows {
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
         for (size_t l = 0; l < maps.size(); ++l) {
             blockers[l].clear();
-            if (exact_ && casters.count) blockers[l].fill(maps[l], casters);
+            if (told > 0 && casters.count) blockers[l].fill(maps[l], casters);
         }
         finished = true;
     }
-
-  private:
-    bool exact_ = false;
 };
 
 } // namespace ringlet

@@ -103,10 +103,11 @@ class FrameRenderer:
         self.count = min(render.strands or strands.count, strands.count)
         self.width = drawn_width(render, self.count, strands.count)
         self._points = self.count * ((strands.points - 1) * render.subdivide + 1)
-        self._exact = told_apart(self._points, self.count * strands.length, self.width)
         self.variation = pigment.variation(render.hair, config.seed, key)
         single = one_fibre_each(render, self.count, strands.count)
         self._now = _Lit(Chunks(strands, self.count), Lighting(scene, render.hair, render.grid, single))
+        lights = self._now.lighting.lights
+        self._told = told_apart(self._points, self.count * strands.length, self.width, lights)
         self._next = self._now.beside(strands, self.count)
         self._ahead = ThreadPoolExecutor(1, "light")
         across, down = (side * render.samples for side in render.size)
@@ -217,10 +218,10 @@ class FrameRenderer:
         """First pass: all strands into the density grid."""
         to.moment = None
         to.chunks.move(moment.guides, moment.pose, moment.moved)
-        cast = self._points if self._exact else self.count * self.strands.points
-        to.lighting.begin(*_bounds(moment), self.width, cast, self._exact)
+        cast = self._points if self._told else self.count * self.strands.points
+        to.lighting.begin(*_bounds(moment), self.width, cast, self._told)
         for first, points in to.chunks:
-            drawn = smooth(points, self.render.subdivide) if self._exact else points
+            drawn = smooth(points, self.render.subdivide) if self._told else points
             to.lighting.add(drawn, self._own_widths(drawn))
             if coverage is not None:
                 coverage.count(first, points, self._own_widths(points))

@@ -30,20 +30,26 @@ _FINER: Final = 3
 _CASTERS: Final = 200_000
 """Points of strands from which on not all cast shadows: of c times as many one in c^0.7."""
 _CASTER: Final = 41  # salt
-_PIECES: Final = 400_000
-"""Points, and lengths of eight widths, of strands up to which it is told which of them light meets."""
+_POINTS: Final = (170_000, _CASTERS)
+"""Points up to which light goes past single strands, and from which on past none."""
+_PIECES: Final = (1_500_000, 1_900_000)
+"""The same of what it costs in time and memory: points and lengths of eight widths together, for each light."""
 _OPAQUE: Final = 4
 """Times that the head is denser for the eye than for light: two voxels of it hide everything."""
 
 
 def pieces(points: int, length: float, width: float) -> float:
-    """What it takes to let light go past single strands: of so many points, so long and so wide [m], in all."""
+    """What it takes a light to go past single strands: of so many points, so long and so wide [m], in all."""
     return points + length / (8 * width)
 
 
-def told_apart(points: int, length: float, width: float) -> bool:
-    """Whether light goes past single strands: it depends on neither camera nor frame."""
-    return points <= _CASTERS and pieces(points, length, width) <= _PIECES
+def told_apart(points: int, length: float, width: float, lights: int) -> float:
+    """Part of the strands that light goes past one by one; it depends on neither camera nor frame.
+
+    They are so many points, so long and so wide [m], in all.
+    """
+    costs = (points, _POINTS), (lights * pieces(points, length, width), _PIECES)
+    return float(min(np.clip((none - cost) / (none - all_of), 0, 1) for cost, (all_of, none) in costs))
 
 
 @dataclass(frozen=True)
@@ -88,15 +94,20 @@ class Lighting:
         self._frame: _Shadowed | None = None
         self._seen: tuple[_F64, kernels.Illumination] | None = None
 
+    @property
+    def lights(self) -> int:
+        """How many directions light comes from, besides the sky."""
+        return len(self._directions)
+
     def beside(self) -> "Lighting":
         """Another one with the same lights, for the frames between."""
         other = copy(self)
         other._shadows = kernels.Shadows(self._directions)
         return other
 
-    def begin(self, lower: _F64, upper: _F64, width: float, points: int = 0, exact: bool = False) -> None:
+    def begin(self, lower: _F64, upper: _F64, width: float, points: int = 0, told: float = 0.0) -> None:
         """Start a frame: bounds (3,) float64 [m] of all strands, a typical drawn width [m], how many points all have, and
-        whether they are `told_apart`.
+        what part of the strands is `told_apart`.
 
         Raises:
             ValueError: bounds that are not finite or upside down.
@@ -113,7 +124,7 @@ class Lighting:
         self._grid = kernels.DensityGrid((nx, ny, nz), origin, spacing, width)
         low = np.asarray(lower, np.float64)
         self._every = max(math.ceil((points / _CASTERS) ** 0.7), 1)
-        self._shadows.begin(low, low + size, spacing / _FINER, width, 1 / self._every, exact)
+        self._shadows.begin(low, low + size, spacing / _FINER, width, 1 / self._every, told)
         self._added = 0
         self._frame, self._seen = None, None
 

@@ -13,7 +13,7 @@ PLACES = 16
 
 def shadows(points: _F32, chunk: int = 10**9) -> kernels.Shadows:
     maps = kernels.Shadows(LIGHTS)
-    maps.begin(LOW, HIGH, SPACING, WIDTH, exact=True)
+    maps.begin(LOW, HIGH, SPACING, WIDTH, told=1.0)
     for first in range(0, len(points), chunk):
         some = points[first : first + chunk]
         maps.add(some, np.full(some.shape[:2], WIDTH, np.float32))
@@ -104,7 +104,7 @@ def test_where_strands_are_not_told_apart_none_can_be_asked_for() -> None:
     maps = kernels.Shadows(LIGHTS)
     maps.begin(LOW, HIGH, SPACING, WIDTH)
     maps.finish(np.zeros((1, 1, 1), np.float32), LOW, 1.0, None, np.eye(4))
-    with pytest.raises(ValueError, match="exact"):
+    with pytest.raises(ValueError, match="told apart"):
         maps.lit(
             0,
             np.zeros((1, 3), np.float32),
