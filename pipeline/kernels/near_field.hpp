@@ -15,13 +15,15 @@
 #include "fibre.hpp"
 #include "strand_point.hpp"
 
+#include <cmath>
+
 namespace ringlet {
 
 constexpr float kPi = 3.14159265f;
 
 /// Strands whose places all look the same.
 struct MeanOnly {
-    RINGLET_INLINE void turn(Floats) {}
+    RINGLET_INLINE void turn(Floats, Floats) {}
     RINGLET_INLINE void add(int, Floats, const Floats[4], const Floats[8], Floats) {}
 };
 
@@ -29,7 +31,8 @@ struct MeanOnly {
 class NearField {
   public:
     /// Absorption in entries of the tables, the eye's inclination and its cosine.
-    NearField(const FibreTables &tables, const Floats level[3], const Place &theta, Floats cosine) : tables_(tables) {
+    NearField(const FibreTables &tables, const Floats level[3], const Place &theta, Floats cosine)
+        : tables_(tables), whole_(1 / std::tanh(kPi / (2 * tables.scale))) {
         for (int c = 0; c < 3; ++c) {
             read<Record>(tables.across, tables.T, Place(level[c], tables.A), theta, leaving_[c]);
             for (Floats &each : aside_[c]) each = splat(0.0f);
@@ -41,22 +44,26 @@ class NearField {
         }
     }
 
-    /// From now on of a light at the azimuth phi from the eye's.
-    void turn(Floats phi) {
+    /// From now on of a light at the azimuth phi from the eye's, of which each point sees this part.
+    void turn(Floats phi, Floats seen) {
+        some_ = any<float>(seen > 0.0f);
+        if (!some_) return;
         for (int p = 0; p < 3; ++p) {
-            Floats side[kCount + 1];
+            Angle before;
             for (int i = 0; i <= kCount; ++i) {
                 const int k = std::abs(i - kHalf);
                 const Floats bent = 2.0f * float(p) * inside_[k] - 2.0f * outside_[k];
                 // Against h: the light enters where the eye would see it leave
-                side[i] = phi + (i < kHalf ? -bent : bent) - float(p) * kPi;
+                const Angle side = angle(phi + (i < kHalf ? -bent : bent) - float(p) * kPi);
+                if (i > 0) turned_[p][i - 1] = density(before, side);
+                before = side;
             }
-            for (int k = 0; k < kCount; ++k) turned_[p][k] = density(side[k], side[k + 1]);
         }
     }
 
     /// Adds a light's share in channel c: `once` is what is seen of it in the mean, of these lobes and their M.
     __attribute__((noinline)) void add(int c, Floats lit, const Floats M[4], const Floats N[8], Floats once) {
+        if (!some_) return;
         Floats sum[kCount];
         for (Floats &each : sum) each = -once;
         for (int p = 0; p < 4; ++p) {
@@ -93,19 +100,31 @@ class NearField {
     typedef float Record __attribute__((vector_size(4 * 4 * kHalf))); // all places of all lobes
 
     const FibreTables &tables_;
+    const float whole_; // what makes all of the logistic that lies in one turn 1
     Floats leaving_[3][4 * kHalf];                   // A_p over its mean, R, G, B
     Floats inside_[kHalf + 1], outside_[kHalf + 1]; // asin(h / eta') and asin(h) between the places
     Floats turned_[3][kCount];                       // mean of D over each
     Floats aside_[3][kCount];
+    bool some_ = false;
+
+    /// An angle, the integral of D up to it, and D times its scale.
+    struct Angle {
+        Floats x, sum, here;
+    };
+
+    RINGLET_INLINE Angle angle(Floats x) const {
+        const Floats turns = nearest<float>(x * (0.5f / kPi)), rest = (x - 2 * kPi * turns) * (1 / tables_.scale);
+        const Floats part = reciprocal<float>(1.0f + exponential(clamp(-rest, -80, 80)));
+        return {x, turns + (part - 0.5f) * whole_, part * (1.0f - part)};
+    }
 
     /// Mean of D from an angle to another one.
-    RINGLET_INLINE Floats density(Floats a, Floats b) const {
-        const float inverse = 1 / tables_.scale;
-        Floats middle = 0.5f * (a + b);
-        middle = -magnitude(middle - 2 * kPi * nearest<float>(middle * (0.5f / kPi))); // D is even, and small numbers are exact
-        const Floats half = maximum<float>(0.5f * magnitude(b - a), splat(5e-3f));
-        const auto up_to = [&](Floats x) RINGLET_ALWAYS { return reciprocal<float>(1.0f + exponential(minimum<float>(-x * inverse, splat(80.0f)))); };
-        return (up_to(middle + half) - up_to(middle - half)) * reciprocal<float>(half);
+    RINGLET_INLINE Floats density(const Angle &a, const Angle &b) const {
+        constexpr float narrow = 0.02f; // [rad] where the difference of sums is rounding
+        const Floats way = b.x - a.x;
+        const Mask<float> wide = magnitude(way) > narrow;
+        const Floats over = maximum<float>((b.sum - a.sum) * reciprocal<float>(wide ? way : splat(1.0f)), splat(0.0f));
+        return wide ? over : (a.here + b.here) * (0.5f / tables_.scale);
     }
 };
 

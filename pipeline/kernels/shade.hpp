@@ -244,7 +244,7 @@ __attribute__((noinline)) void add_light(const FibrePoints &p, const Illuminatio
     const Floats alone = exponential(-before), chance = light.glints ? (uniform(glint) < alone ? splat(1.0f) : splat(0.0f)) : alone;
     const Floats seen = p.told ? p.lit : chance;
     const Floats facing = maximum<float>(dot(normal, L), splat(0.2f));
-    places.turn(dot(cross(p.tangent, p.to_eye), L) < 0.0f ? -phi : phi);
+    places.turn(dot(cross(p.tangent, p.to_eye), L) < 0.0f ? -phi : phi, seen);
     for (int c = 0; c < 3; ++c) {
         read_lobes(tables, Place(p.level[c], tables.A), theta, azimuth, lobes);
         const Flux flux = two_flux(p.layers[c], way.n, way.behind, through, past);

@@ -13,9 +13,7 @@ Points = NDArray[np.float32]
 Which = NDArray[np.uint32]
 Shape = Literal["tubes", "ribbons", "lines", "coverage"]
 
-TUBES_FROM = (
-    3.0  # [px] projected width from which `auto` fades from coverage to tubes: their roundness begins to show
-)
+TUBES_FROM = 3.0  # [px] projected width from which `auto` fades from coverage to tubes: its strips have notches at bends
 TUBES_ALONE = 4.0  # [px] and from which it draws tubes alone
 
 _FIBRE = 80e-6  # [m] a human hair's diameter

@@ -48,7 +48,7 @@ def lit(azimuth: float, upwards: float = 0.0) -> kernels.Illumination:
     low, high = np.full(3, -1.0), np.full(3, 1.0)
     shadows.begin(low, high, 0.1, 1e-3)
     shadows.finish(np.zeros((4, 4, 4), np.float32), low, 0.5, None, np.eye(4))
-    around, everywhere = np.ones((2, 2, 2, 8), np.float32), np.ones((2, 2, 2, 4), np.float32)
+    around, everywhere = np.ones((2, 2, 2, 16), np.float32), np.ones((2, 2, 2, 4), np.float32)
     none = np.zeros(3, np.float32)
     return kernels.Illumination(L, np.ones((1, 3), np.float32), none, shadows, around, everywhere)
 

@@ -6,7 +6,15 @@ import pytest
 from pipeline.body.placement import Placement
 from pipeline.config.schema import Camera, Render
 from pipeline.render.camera import CameraPath
-from pipeline.render.geometry import choose_shapes, drawn_width, projected_width, ribbons, smooth, taper
+from pipeline.render.geometry import (
+    choose_shapes,
+    drawn_width,
+    one_fibre_each,
+    projected_width,
+    ribbons,
+    smooth,
+    taper,
+)
 from pipeline.render.target import BRIGHTEST, DECODED, encode
 
 
@@ -40,6 +48,14 @@ def test_fewer_strands_are_drawn_wider_so_that_coverage_stays() -> None:
     assert few == pytest.approx(2 * many)
     assert drawn_width(Render(), 1_000_000) == many
     assert drawn_width(Render(width=1e-3), 10) == 1e-3
+
+
+def test_strands_that_stand_for_several_fibres_show_no_sides_of_one() -> None:
+    assert one_fibre_each(Render(), 100_000)
+    assert one_fibre_each(Render(), 60_000)
+    assert not one_fibre_each(Render(), 40_000)
+    assert not one_fibre_each(Render(), 50_000, of=100_000)
+    assert one_fibre_each(Render(width=1e-4), 10)
 
 
 def test_tips_thin_out_and_roots_do_not() -> None:
