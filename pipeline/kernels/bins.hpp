@@ -129,6 +129,7 @@ struct Bins {
             const int P = strands.P;
             const float *points = strands.points + size_t(s) * 3 * P, *widths = strands.widths + size_t(s) * P;
             const bool whole = at.project(view, points, widths, P);
+            if (whole) at.h[0] = -at.h[0], at.h[P - 1] = -at.h[P - 1]; // as ScreenPoint has it
             const uint32_t first = uint32_t(batch.key.size()) * uint32_t(P);
             int last = -2; // segment that was kept last
             for (int begin = 0; begin + 1 < P; begin += kLanes<float>) {
@@ -145,12 +146,10 @@ struct Bins {
         /// Keeps segment j if it may be seen.
         void keep(int j, const float *widths, bool whole, uint32_t name, uint32_t first, int &last) {
             ScreenPoint ends[2] = {{at.x[j], at.y[j], at.d[j], at.h[j]}, {at.x[j + 1], at.y[j + 1], at.d[j + 1], at.h[j + 1]}};
-            if (!whole && !clipped(view, at, widths, j, ends)) return;
-            if (j == 0 && ends[0].h > 0) ends[0].end();
-            if (j == strands.P - 2 && ends[1].h > 0) ends[1].end();
+            if (!whole && !clipped(view, at, widths, strands.P, j, ends)) return;
             const bool goes_on = whole && last == j - 1; // then the last point is there already
             const uint32_t segment = uint32_t(batch.seen.size()) - (goes_on ? 1 : 0);
-            if (!visible(Segment(ends[0], ends[1]), name | segment)) return;
+            if (!visible(Segment(ends[0], ends[1]), distance(ends[0], ends[1]), name | segment)) return;
             // A point that the near plane has moved keeps its colour
             for (int end = goes_on ? 1 : 0; end < 2; ++end) {
                 batch.at.push_back(ends[end]);
@@ -165,7 +164,7 @@ struct Bins {
             const int across = view.across() * kSide;
             const Floats x0 = read(at.x, j), y0 = read(at.y, j), d0 = read(at.d, j), h0 = read(at.h, j);
             const Floats x1 = read(at.x, j + 1), y1 = read(at.y, j + 1), d1 = read(at.d, j + 1), h1 = read(at.h, j + 1);
-            const Floats wide = margin + maximum<float>(h0, h1);
+            const Floats wide = margin + maximum<float>(magnitude(h0), magnitude(h1));
             const Mask<float> inside = (maximum<float>(x0, x1) > -wide) & (minimum<float>(x0, x1) < float(view.W) + wide) &
                                        (maximum<float>(y0, y1) > -wide) & (minimum<float>(y0, y1) < float(view.H) + wide);
             const float columns = float(across - 1), rows = float(view.down() * kSide - 1);
@@ -192,20 +191,20 @@ struct Bins {
         }
 
         /// Enters a segment into the blocks where it may be seen; whether there are any.
-        bool visible(const Segment &s, uint32_t number) {
-            if (!s.drawable()) return false;
+        bool visible(const Segment &s, float length, uint32_t number) {
+            if (!s.drawable(length)) return false;
             bool some = false;
-            visit_blocks(view, s, [&](int block, float left, float top) {
-                if (!seen_in(s, block, left, top)) return;
+            visit_blocks(view, s, length, [&](int block, float left, float top) {
+                if (!seen_in(s, length, block, left, top)) return;
                 batch.entries.push_back({uint32_t(block), number});
                 some = true;
             });
             return some;
         }
 
-        bool seen_in(const Segment &s, int block, float left, float top) const {
+        bool seen_in(const Segment &s, float length, int block, float left, float top) const {
             constexpr int count = kSide * kSide;
-            const Touch touch(s, middle, left, top);
+            const Touch touch(s, length, middle, left, top);
             TileLanes before;
             std::memcpy(&before, &cut[size_t(block) * count], sizeof before);
             const uint32_t tiles = set_lanes<float>(touch.tiles & (touch.nearest <= before));

@@ -27,9 +27,9 @@ struct Touch {
     TileLanes nearest; // its least depth in the tile, or less
     TileLanes depth;   // at its point nearest the tile's middle: tiles are composited in this order
 
-    /// The block's corner is at (left, top) [px].
-    RINGLET_INLINE Touch(const Segment &s, const TileMiddles &middle, float left, float top) {
-        const float reach = s.reach(), length = s.length(), dx = s.ux * length, dy = s.uy * length;
+    /// Of a segment so long [px]; the block's corner is at (left, top) [px].
+    RINGLET_INLINE Touch(const Segment &s, float length, const TileMiddles &middle, float left, float top) {
+        const float reach = s.reach(), dx = s.ux * length, dy = s.uy * length;
         const TileLanes x = middle.x + (left - s.x), y = middle.y + (top - s.y);
         const float wide = kTile * 0.5f * (std::abs(s.ux) + std::abs(s.uy)) + reach, far = kTile * 0.5f + reach;
         tiles = (magnitude(x * s.uy - y * s.ux) <= wide) & (magnitude(x - 0.5f * dx) <= far + 0.5f * std::abs(dx)) &
@@ -41,10 +41,10 @@ struct Touch {
     }
 };
 
-/// Calls visit(block, left, top) for the blocks that the box around a segment touches.
-template <class Visit> inline void visit_blocks(const View &view, const Segment &s, Visit &&visit) {
+/// Calls visit(block, left, top) for the blocks that the box around a segment so long [px] touches.
+template <class Visit> inline void visit_blocks(const View &view, const Segment &s, float length, Visit &&visit) {
     constexpr float side = kSide * kTile, per_block = 1 / side;
-    const float reach = s.reach(), length = s.length(), x1 = s.x + s.ux * length, y1 = s.y + s.uy * length;
+    const float reach = s.reach(), x1 = s.x + s.ux * length, y1 = s.y + s.uy * length;
     const float left = std::min(s.x, x1) - reach, right = std::max(s.x, x1) + reach;
     const float top = std::min(s.y, y1) - reach, bottom = std::max(s.y, y1) + reach;
     // Compared as numbers: what lies far outside must not wrap when it becomes an integer

@@ -117,8 +117,14 @@ struct ScreenPoint {
     void end() { h = -h; }
 };
 
-/// The part of segment j of a strand that is in front of the near plane, where the strand ends. False where nothing is.
-inline bool clipped(const View &view, const ScreenStrand &s, const float *widths, int j, ScreenPoint to[2]) {
+/// How far apart two points are on the screen [px].
+RINGLET_INLINE float distance(const ScreenPoint &a, const ScreenPoint &b) {
+    const float dx = b.x - a.x, dy = b.y - a.y;
+    return std::sqrt(dx * dx + dy * dy);
+}
+
+/// The part of segment j of a strand of P points that is in front of the near plane, where the strand ends. False where nothing is.
+inline bool clipped(const View &view, const ScreenStrand &s, const float *widths, int P, int j, ScreenPoint to[2]) {
     const float w0 = s.cw[j], w1 = s.cw[j + 1];
     if (!(w0 >= view.near || w1 >= view.near)) return false;
     const float t[2] = {w0 < view.near ? (view.near - w0) / (w1 - w0) : 0, w1 < view.near ? (view.near - w0) / (w1 - w0) : 1};
@@ -130,7 +136,8 @@ inline bool clipped(const View &view, const ScreenStrand &s, const float *widths
         to[end].y = (1 - between(s.cy[j], s.cy[j + 1]) * inverse) * (0.5f * view.H);
         to[end].d = std::max(slope * (1 - view.near * inverse), 0.0f);
         to[end].h = 0.5f * view.scale * between(widths[j], widths[j + 1]) * inverse;
-        if (t[end] != float(end)) to[end].end();
+        const bool last = end == 0 ? j == 0 : j + 2 == P;
+        if (t[end] != float(end) || last) to[end].end();
     }
     return true;
 }
@@ -156,7 +163,7 @@ struct alignas(64) Segment {
         : x(a.x), y(a.y), ends((a.h < 0 ? kFirst : kJoints) | (b.h < 0 ? kLast : kJoints)), h(std::abs(a.h)), dh(std::abs(b.h) - std::abs(a.h)),
           shown{0, 0, 0, a.d}, gain{0, 0, 0, b.d - a.d} {
         const float dx = b.x - a.x, dy = b.y - a.y;
-        inverse = 1 / std::sqrt(dx * dx + dy * dy);
+        inverse = 1 / distance(a, b);
         ux = dx * inverse, uy = dy * inverse;
     }
 
@@ -164,9 +171,9 @@ struct alignas(64) Segment {
     float d() const { return shown[3]; }
     float dd() const { return gain[3]; }
 
-    /// Whether it can be drawn: all of it finite, and neither endless nor a point.
-    bool drawable() const {
-        const float length = this->length(), most = std::max({std::abs(x), std::abs(y), std::abs(x + ux * length), std::abs(y + uy * length), h, h + dh});
+    /// Whether it can be drawn: all of it finite, and neither endless nor a point. `length` [px] is its own.
+    bool drawable(float length) const {
+        const float most = std::max({std::abs(x), std::abs(y), std::abs(x + ux * length), std::abs(y + uy * length), h, h + dh});
         return most < kOutermost && length >= kShortest && std::isfinite(x + y + d() + dd() + h + dh + length);
     }
 
