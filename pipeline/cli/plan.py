@@ -136,7 +136,7 @@ def _render(config: Config) -> Cost:
 
 def _light(config: Config) -> float:
     """Bytes of shadow maps and grids."""
-    from pipeline.render.geometry import drawn_width
+    from pipeline.render.geometry import drawn_width, one_fibre_each
     from pipeline.render.lighting import pieces, told_apart
     from pipeline.render.lights import as_directions
 
@@ -145,7 +145,8 @@ def _light(config: Config) -> float:
     points = count * ((config.groom.points - 1) * render.subdivide + 1)
     strands = points, count * _LENGTH, drawn_width(render, count, _strands(config))
     directions, _ = as_directions(config.scene.lights)
-    each = _LIGHT_B_PER_PIECE * pieces(*strands) if told_apart(*strands, len(directions)) else 0.0
+    apart = one_fibre_each(render, count, _strands(config)) and told_apart(*strands, len(directions))
+    each = _LIGHT_B_PER_PIECE * pieces(*strands) if apart else 0.0
     each += _NODES * _LIGHT_B_PER_NODE * render.grid**2
     return len(directions) * each + _LIGHT_B_PER_VOXEL * render.grid**3
 

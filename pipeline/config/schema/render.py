@@ -48,7 +48,7 @@ class Fibre(Section):
     reciprocal: bool = False
     """Fresnel's terms and the absorption of a fibre are those at half the difference of both inclinations, not, as in path tracers, at the eye's: light and eye may then change places."""
     glints: bool = True
-    """Sample visibility per strand instead of averaging it: single exposed strands sparkle. Few strands are told apart: what light meets is known."""
+    """Sample visibility per strand instead of averaging it: single exposed strands sparkle. Few strands whose width is given are told apart: what light meets is known."""
     dye: Dye | None = None
     """Dye on top of the melanin."""
     along: tuple[Stop, ...] = ()
