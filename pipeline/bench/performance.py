@@ -173,7 +173,7 @@ def _frames(sizes: Sizes, config: Path) -> Section:
     whole = ("--config", config) if sizes.whole else ()
     return Section(
         "Frames",
-        "Full HD, 16 points a strand, 2 x 2 supersampling; each after a first one.",
+        "Full HD, 16 points a strand, 2 x 2 supersampling; twelve frames in a row after a first one, but one of tubes.",
         {"seconds": "s", "peak_rss_gb": "memory [GB]", "value": ""},
         [Task("", ("render-table", "--strands", sizes.drawn, *whole), unfold)],
     )

@@ -69,7 +69,7 @@ def bench(
     *,
     threads: int = 0,
     chunk: int = chunks.CHUNK,
-    frames: int = 4,
+    frames: int = 12,
 ) -> dict[str, Any]:
     """Render frames of a swinging head of hair as the stage does.
 

@@ -136,7 +136,7 @@ def bench_render(
     samples: Annotated[int, Parameter(help="N for N x N supersampling.")] = 2,
     threads: Annotated[int, Parameter(help="0 for all processors.")] = 0,
     chunk: Annotated[int, Parameter(help="Strands in flight at once.")] = 65_536,
-    frames: Annotated[int, Parameter(help="How many are timed, after a first one.")] = 4,
+    frames: Annotated[int, Parameter(help="How many are timed, after a first one.")] = 12,
     json: Json = False,
 ) -> None:
     """Frames in a row: seconds for each, memory, and a digest that neither threads nor chunks change."""
