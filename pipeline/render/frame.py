@@ -108,9 +108,8 @@ class FrameRenderer:
         self._now = _Lit(Chunks(strands, self.count), Lighting(scene, render.hair, render.grid, single))
         lights = self._now.lighting.lights
         told = told_apart(self._points, self.count * strands.length, self.width, lights)
-        self._told = (
-            told if single else 0.0
-        )  # what stands for several fibres is among more, and thinner, ones
+        # What stands for several fibres lies among more and thinner ones
+        self._told = told if single else 0.0
         self._next = self._now.beside(strands, self.count)
         self._ahead = ThreadPoolExecutor(1, "light")
         across, down = (side * render.samples for side in render.size)

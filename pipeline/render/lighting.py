@@ -39,14 +39,14 @@ _OPAQUE: Final = 4
 
 
 def pieces(points: int, length: float, width: float) -> float:
-    """What it takes a light to go past single strands: of so many points, so long and so wide [m], in all."""
+    """What it takes a light to go past single strands: of so many points, so long in all and so wide each [m]."""
     return points + length / (8 * width)
 
 
 def told_apart(points: int, length: float, width: float, lights: int) -> float:
-    """Part of the strands that light goes past one by one; it depends on neither camera nor frame.
+    """Part of the strands (0 .. 1) that light goes past one by one; it depends on neither camera nor frame.
 
-    They are so many points, so long and so wide [m], in all.
+    They have so many points, are so long in all [m] and so wide each [m], under so many lights.
     """
     costs = (points, _POINTS), (lights * pieces(points, length, width), _PIECES)
     return float(min(np.clip((none - cost) / (none - all_of), 0, 1) for cost, (all_of, none) in costs))

@@ -61,7 +61,7 @@ def compare(
 
 
 def _around(light: _F64, covered: NDArray[np.bool_] | _F32, region: int) -> _F64:
-    """Mean light (H, W) around each pixel, of what is covered: whole pixels, or the parts that hair over black covers."""
+    """Mean of light (H, W) around each pixel, (H, W), of what is covered (H, W): whole pixels, or parts of them over black."""
     shown = light * covered if covered.dtype == np.bool_ else light
     within = uniform_filter(covered.astype(np.float64), region)
     mean: _F64 = uniform_filter(shown, region) / np.maximum(within, 1e-9)
